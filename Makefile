@@ -14,6 +14,7 @@
 #   make bounds  run the numerical tests with the oldest versions allowed of what is needed
 #   make core    build what is compiled, after a change of it
 #   make sanitize   run the tests of what is compiled with AddressSanitizer and UndefinedBehaviorSanitizer
+#   make marches   compare what the core computes when built for the oldest processors and for this one
 #   make build   build the wheels (in dist/)
 #   make docs    build the documentation (in docs/_build/html)
 #   make clean   remove what was built and computed, .venv included
@@ -45,7 +46,7 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 DOCUMENTED := jeat_graph filters association smoothers eval configs sehn/jeat_graph_sehn benchmarks
 
 .PHONY: demo test test-slow test-all installed-for-tests test-portable benchmark licences live fuzz lint types bounds core \
-	sanitize build docs clean
+	sanitize marches build docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.core $(VENV)/.sehn
@@ -106,6 +107,11 @@ core: $(VENV)/.core
 sanitize: $(VENV)/.test $(VENV)/.core
 	@echo "make: building the core with the sanitizers"
 	@PYTHON=$(BIN)/python .ci/sanitize
+
+# The same bits from a core for the oldest processors and from one for this very processor.
+marches: $(VENV)/.core
+	@echo "make: comparing the core for the oldest processors with that for this one"
+	@PYTHON=$(BIN)/python .ci/marches
 
 build: build/.wheel
 

@@ -12,7 +12,7 @@ DATA = ("py", "js", "css", "yaml", "onnx", "gz", "json", "typed")
 #: Type stubs of what is compiled, which its build writes.
 STUBS = (
     "jeat_graph/core/_core/__init__.pyi",
-    *(f"jeat_graph/core/_core/{folder}.pyi" for folder in ("detection", "events", "io")),
+    *(f"jeat_graph/core/_core/{folder}.pyi" for folder in ("detection", "events", "io", "road", "tracking")),
 )
 #: Sources of what is compiled, and what the build of a checkout leaves in it.
 UNWANTED = (".hpp", ".cpp", ".txt", ".pth", ".new")

@@ -12,7 +12,7 @@ from pathlib import Path
 from jeat_graph.data.errors import CoreMissingError
 
 try:
-    from jeat_graph.core._core import detection, events, io
+    from jeat_graph.core._core import detection, events, io, road
 except ModuleNotFoundError:
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     raise CoreMissingError(
@@ -20,4 +20,4 @@ except ModuleNotFoundError:
         "that checkout with `make core` or `pip install --editable .`, which need a C++20 compiler"
     ) from None
 
-__all__ = ["detection", "events", "io"]
+__all__ = ["detection", "events", "io", "road"]

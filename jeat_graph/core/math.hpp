@@ -1,6 +1,6 @@
-// exp, log and what follows from them, the same on every machine: the C library's differ in their last bit.
+// exp, log, arctan and what follows from them, the same on every machine: the C library's differ in their last bit.
 //
-// Errors are below two units in the last place; tests compare with NumPy's.
+// Errors of exp and log are below two units in the last place, of arctan below four; tests compare with NumPy's.
 #pragma once
 
 #include <array>
@@ -71,6 +71,28 @@ inline double expit(double x) {
     if (x >= 0.0) return 1.0 / (1.0 + exp_of(-x));
     const double e = exp_of(x);
     return e / (1.0 + e);
+}
+
+// arctan x for |x| <= 1, by its series at a quarter of the angle: tan(a/2) = tan a / (1 + sqrt(1 + tan² a)).
+inline double atan_of(double x) {
+    for (int halved = 0; halved < 2; ++halved) x /= 1.0 + std::sqrt(1.0 + x * x);
+    const double x2 = x * x;
+    double sum = 0.0;
+    for (int n = 25; n > 1; n -= 2) sum = x2 * (kReciprocals[n] - sum);
+    return 4.0 * (x - x * sum);
+}
+
+// The angle of the finite point (x, y), in [-π, π].
+inline double atan2_of(double y, double x) {
+    const double across = std::abs(x), up = std::abs(y);
+    double angle = 0.0;
+    if (up > across) {
+        angle = kPi / 2.0 - atan_of(across / up);
+    } else if (across > 0.0) {
+        angle = atan_of(up / across);
+    }
+    if (std::signbit(x)) angle = kPi - angle;
+    return std::copysign(angle, y);
 }
 
 // ln Γ(x) for x > 0: Stirling's series, after moving x to 10 or more.

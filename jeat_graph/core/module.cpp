@@ -12,6 +12,9 @@ void bind(nb::module_& module);
 namespace jeat::io {
 void bind(nb::module_& module);
 }
+namespace jeat::road {
+void bind(nb::module_& module);
+}
 namespace jeat::tracking {
 void bind(nb::module_& module);
 }
@@ -24,6 +27,8 @@ NB_MODULE(_core, module) {
     jeat::events::bind(events);
     auto io = module.def_submodule("io", "Kernels of jeat_graph.io.");
     jeat::io::bind(io);
+    auto road = module.def_submodule("road", "Kernels of jeat_graph.road.");
+    jeat::road::bind(road);
     auto tracking = module.def_submodule("tracking", "The tracker's step.");
     jeat::tracking::bind(tracking);
 }

@@ -2,7 +2,8 @@
 
 A silent sensor needs no help in the tracker: only a scan that found nothing counts as a miss, and no scan
 says nothing. One that delivers rubbish loses its weight by itself: the running estimates of its clutter and
-of its noise rise, and that of its trust falls. What is done here is to notice, and to say so.
+of its noise rise, and the probability that what it finds is real falls. What is done here is to notice, and to
+say so: by what is usual of the sensor itself, as a slow mean over the time in which it was well.
 """
 
 from __future__ import annotations
@@ -15,10 +16,14 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.tracking.sensor_state import SensorState
 
 SILENT, BACK, RUBBISH, WELL = "silent", "back", "rubbish", "well"
-#: So many times the configured clutter, or the greatest noise scale, is rubbish; half of it is well again.
+#: So many times its usual clutter, or noise variance, is rubbish; half of it is well again.
 CLUTTER_FACTOR, NOISE_FACTOR, AGAIN = 10.0, 4.0, 0.5
-#: So is a sensor that the others bear out so little (factor on its evidence); twice that is well again.
-LEAST_TRUST = 0.05
+#: So is a sensor whose finds are real with no more than this probability; twice that is well again.
+LEAST_REAL = 0.05
+#: Fewer false boxes a scan than this are never many.
+LEAST_CLUTTER = 1.0
+# Weight of one judgement in what is usual.
+_FOLLOWS = 0.02
 
 
 class HealthChange(NamedTuple):
@@ -41,12 +46,13 @@ class SensorHealth:
     """Watches the sensors that have given a scan.
 
     Args:
-        config: declared rates, clutter, and when a sensor counts as silent (`live`).
+        config: declared rates, and when a sensor counts as silent (`live`).
 
     Attributes:
         last: time of the newest scan of each sensor (s), its latency taken off.
         silent: sensors that are silent now.
         rubbish: sensors that deliver rubbish now.
+        usual: clutter and noise variance of each sensor, as far as it was well.
     """
 
     def __init__(self, config: Config) -> None:
@@ -55,6 +61,7 @@ class SensorHealth:
         self.last: dict[str, float] = {}
         self.silent: list[str] = []
         self.rubbish: list[str] = []
+        self.usual: dict[str, list[float]] = {}
 
     def know(self, config: Config) -> list[str]:
         """Go by a configuration from now on: that of a tracker which has met another sensor.
@@ -107,7 +114,7 @@ class SensorHealth:
         self.last = dict.fromkeys(self.last, now)
 
     def judge(self, states: dict[str, SensorState], now: float) -> list[HealthChange]:
-        """Compare what the tracker has learnt of the sensors with what is declared of them.
+        """Compare what the tracker has learnt of the sensors with what is usual of them.
 
         Args:
             states: from `Tracker.sensor_states`.
@@ -115,21 +122,25 @@ class SensorHealth:
         """
         events = []
         for name in self.last:
-            state, declared = states[name], self._config.sensors[name].clutter_per_scan
+            state = states[name]
+            usual = self.usual.setdefault(name, [state.clutter, state.noise_scale])
             worst = max(
-                state.clutter / (CLUTTER_FACTOR * declared),
-                state.noise_scale / NOISE_FACTOR,
-                LEAST_TRUST / max(state.trust, 1e-9),
+                state.clutter / (CLUTTER_FACTOR * max(usual[0], LEAST_CLUTTER)),
+                state.noise_scale / (NOISE_FACTOR * usual[1]),
+                LEAST_REAL / max(state.trust, 1e-9),
             )
             if worst >= 1.0 and name not in self.rubbish:
                 self.rubbish.append(name)
                 text = (
-                    f"sensor {name!r} delivers rubbish: {state.clutter:.3g} false boxes a scan ({declared:g} "
-                    f"declared), noise variance {state.noise_scale:.3g} times that declared, trust "
-                    f"{state.trust:.2g}; it weighs less"
+                    f"sensor {name!r} delivers rubbish: {state.clutter:.3g} false boxes a scan ({usual[0]:.3g} "
+                    f"usually), noise variance {state.noise_scale / usual[1]:.3g} times as usual, "
+                    f"{100.0 * state.trust:.2g} % of what it finds are real; it weighs less"
                 )
                 events.append(HealthChange(now, name, RUBBISH, text))
             elif worst < AGAIN and name in self.rubbish:
                 self.rubbish.remove(name)
-                events.append(HealthChange(now, name, WELL, f"sensor {name!r} is as good as declared again"))
+                events.append(HealthChange(now, name, WELL, f"sensor {name!r} is as good as usual again"))
+            if name not in self.rubbish:
+                usual[0] += _FOLLOWS * (state.clutter - usual[0])
+                usual[1] += _FOLLOWS * (state.noise_scale - usual[1])
         return events

@@ -101,6 +101,7 @@ class Session:
                 self._seen.set_state(kept["seen"])
             self._health.last = kept.get("last", {})
             self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
+            self._health.usual = kept.get("usual", {})
         self._told = Told(ends.warn, live.tracker.config.live.jump_s)
         self._owed = False  # the tracker has taken a scan whose answer has not gone out
         self._unconfirmed = ""  # or why the last answers may not have arrived
@@ -186,6 +187,7 @@ class Session:
                 "last": self._health.last,
                 "silent": self._health.silent,
                 "rubbish": self._health.rubbish,
+                "usual": self._health.usual,
                 "kept": self.ends.kept(),
                 "smoothed": None if self.ends.smoothed is None else self.ends.smoothed.flush(),
             }

@@ -8,8 +8,8 @@ import numpy as np
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
-from jeat_graph.road.box_kernel import HIGH, LOW, NEITHER, WHOLE
-from jeat_graph.road.box_solver import BoxRows
+from jeat_graph.road.box_channels import HIGH, LOW, NEITHER, WHOLE
+from jeat_graph.road.box_errors import BoxRows
 from jeat_graph.road.camera import RoadCamera
 
 _CUT_SIGMAS = 2.0  # a side this many standard deviations from the picture's edge may be cut off by it

@@ -9,8 +9,8 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.road.box_errors import BoxRows
 from jeat_graph.road.box_rows import BoxConfig, rows_of_table
-from jeat_graph.road.box_solver import BoxRows
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.cuboid_fit import CuboidConfig, fit_cuboid
 from jeat_graph.road.fleet import CLASSES

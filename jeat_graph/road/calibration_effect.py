@@ -6,22 +6,22 @@ from collections.abc import Callable
 
 import numpy as np
 
+from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.road.box_kernel import KernelCamera, kernel_camera
-from jeat_graph.road.box_solver import BoxRows, whiten
+from jeat_graph.road.box_errors import BoxRows, whiten
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 
 _CALIBRATION_STEP = 1e-3  # in standard deviations of each parameter, where it has one
 
 
-def residual_slopes(camera: RoadCamera, residual: Callable[[KernelCamera], FloatArray]) -> FloatArray:
+def residual_slopes(camera: RoadCamera, residual: Callable[[core.Camera], FloatArray]) -> FloatArray:
     """Derivatives (..., 12) of residuals with respect to the camera's parameters, zero for exact ones."""
     spread = np.sqrt(np.diag(camera.covariance))
-    slopes = np.zeros((*residual(kernel_camera(camera)).shape, len(PARAMETERS)))
+    slopes = np.zeros((*residual(camera.compiled()).shape, len(PARAMETERS)))
     for k in np.flatnonzero(spread > 0):
         change = np.zeros(len(PARAMETERS))
         change[k] = _CALIBRATION_STEP * spread[k]
-        more, less = (residual(kernel_camera(camera.moved(sign * change))) for sign in (1.0, -1.0))
+        more, less = (residual(camera.moved(sign * change).compiled()) for sign in (1.0, -1.0))
         slopes[..., k] = (more - less) / (2.0 * change[k])
     return slopes
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 
@@ -94,6 +95,17 @@ class RoadCamera:
             raise DataError(f"a focal length must be positive, got {self.fx:g} and {self.fy:g} px")
         if self.position[2] <= 0:
             raise DataError(f"the camera must be above the road, got a height of {self.position[2]:g} m")
+
+    def compiled(self) -> core.Camera:
+        """Return the camera as the core takes it."""
+        return core.Camera(
+            np.ascontiguousarray(self.rotation, dtype=np.float64),
+            np.ascontiguousarray(self.position, dtype=np.float64),
+            (self.fx, self.fy),
+            (self.cx, self.cy),
+            (self.width, self.height),
+            (self.k1, self.k2),
+        )
 
     # -- road to picture ------------------------------------------------------------------------------
 

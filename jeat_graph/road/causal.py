@@ -1,4 +1,4 @@
-"""The vehicles on the road while they are tracked: a table of road states for each step of the tracker."""
+"""The filter on the road: where each vehicle is now, how fast, and how large, at each step of the tracker."""
 
 from __future__ import annotations
 
@@ -12,33 +12,17 @@ import numpy.typing as npt
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.config.schema import Config
+from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
-from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.road.box_kernel import kernel_camera
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.causal_steps import forget, step_road
 from jeat_graph.road.fleet import CLASSES, EXTREMES, MOST_BEYOND
 from jeat_graph.road.results import columns_of_states
-from jeat_graph.road.road_state import MODEL, ROAD_ROW, SPEED, STRIPS, TRACK, RoadState
+from jeat_graph.road.road_state import ROAD_ROW, SPEED
 from jeat_graph.road.speeds import KMH
 from jeat_graph.road.taken_boxes import sensor_errors
-from jeat_graph.tracking.direct_call import DirectCall
 
-_OF_CONFIG = (
-    "speed_std",
-    "strip_std",
-    "acceleration_std",
-    "acceleration_s",
-    "lateral_std",
-    "lateral_s",
-    "edge_px",
-    "gate",
-    "pause",
-    "most_beyond",
-)
-_FIRST_CAPACITY = 64
+_OF_BOX = ("track_id", "sensor", "z", "r", "coloured_std", "log_size")
 _FORGET_EVERY = 512  # steps
-_ROOM = 4096  # records
 _GRID = (24, 14)  # places of the picture at which the calibration's share is worked out
 
 
@@ -74,21 +58,14 @@ class RoadFilterConfig:
         check(self)
 
 
-def road_model(config: RoadFilterConfig, camera: RoadCamera) -> RecordArray:
-    """Return what compiled code takes: one record of `MODEL` (1,)."""
+def _fleet_sizes() -> tuple[FloatArray, FloatArray]:
+    """Mean (3,) and covariance (3, 3) of the size of a vehicle that was not seen yet."""
     share = np.array([one.share for one in CLASSES])
     mean = np.array([one.mean for one in CLASSES])
     middle = share @ mean
     off = mean - middle
     within = np.diag(share @ np.array([one.spread for one in CLASSES]) ** 2)
-    model = np.zeros(1, dtype=MODEL)
-    model["size_mean"] = middle
-    model["size_cov"] = np.einsum("k,ki,kj->ij", share, off, off) + within
-    model["picture"] = camera.width, camera.height
-    model["extremes"] = EXTREMES
-    for name in _OF_CONFIG:
-        model[name] = getattr(config, name)
-    return model
+    return middle, np.einsum("k,ki,kj->ij", share, off, off) + within
 
 
 class RoadFilter:
@@ -103,15 +80,16 @@ class RoadFilter:
     def __init__(
         self, camera: RoadCamera, sensors: Config, config: RoadFilterConfig = RoadFilterConfig()
     ) -> None:
-        self._model = road_model(config, camera)
         errors = sensor_errors(sensors)
-        self._errors = np.stack([errors.memory_s, errors.coloured_share], axis=1)
-        self._camera = kernel_camera(camera)
+        self._filter = core.Filter(
+            camera.compiled(),
+            config,
+            *_fleet_sizes(),
+            EXTREMES,
+            np.stack([errors.memory_s, errors.coloured_share], axis=1),
+        )
         self._config = config
-        self._state = _allocate(_FIRST_CAPACITY, len(self._errors))
-        self._room, self._used = np.empty(0, dtype=ROAD_ROW), 0
         self._steps = 0
-        self._step = DirectCall(step_road)
         self._calibration = CalibrationShare(camera)
 
     def step(self, t: float, rows: RecordArray, ids: IntArray) -> RecordArray:
@@ -125,19 +103,18 @@ class RoadFilter:
         Returns:
             (K,) records of `road_state.ROAD_ROW`: the states of those of them that stand on the road.
         """
-        if int(self._state.count[0]) + len(rows) > len(self._state.track):
-            self._state = _grown(self._state, len(rows))
-        if self._used + len(ids) > len(self._room):
-            # One piece for many steps: room for records costs more to ask for than to fill.
-            self._room, self._used = np.empty(max(_ROOM, len(ids)), dtype=ROAD_ROW), 0
-        found = self._room[self._used : self._used + len(ids)]
-        rows, ids = np.ascontiguousarray(rows, dtype=MEASUREMENT), np.ascontiguousarray(ids, dtype=np.int64)
-        count = self._step(self._state, float(t), rows, ids, self._model, self._errors, self._camera, found)
+        if len(rows):
+            of_tracks, sensors, *of_boxes = (np.ascontiguousarray(rows[name]) for name in _OF_BOX)
+            z, r, coloured_std, log_size = of_boxes
+            size_var = rows["size_var"] * rows["scale"][:, None]
+            self._filter.take(t, of_tracks, sensors, z, r, coloured_std, log_size, size_var)
+        known, mean, var = self._filter.read(t, np.ascontiguousarray(ids, dtype=np.int64))
         self._steps += 1
         if self._steps % _FORGET_EVERY == 0:
-            forget(self._state, t, self._config.silence_s)
-        self._used += count
-        return found[:count]
+            self._filter.forget(t, self._config.silence_s)
+        found = np.empty(len(known), dtype=ROAD_ROW)
+        found["t"], found["track_id"], found["mean"], found["var"] = t, known, mean, var
+        return found
 
     def columns(self, steps: Sequence[RecordArray]) -> dict[str, npt.NDArray[Any]]:
         """Columns of the table of the road of some steps, the calibration's share included.
@@ -205,20 +182,3 @@ class CalibrationShare:
             return np.zeros((len(xy), 2)), np.zeros(len(xy))
         nearest = ((xy[:, None] - self._place) ** 2).sum(axis=-1).argmin(axis=1)
         return np.diagonal(self._place_cov[nearest], axis1=1, axis2=2), self._relative[nearest]
-
-
-def _allocate(capacity: int, sensors: int) -> RoadState:
-    return RoadState(
-        np.zeros(capacity, dtype=TRACK),
-        np.full((capacity, sensors), -math.inf),
-        np.zeros((STRIPS, 3)),
-        np.zeros(1, dtype=np.int64),
-    )
-
-
-def _grown(state: RoadState, more: int) -> RoadState:
-    n = int(state.count[0])
-    larger = _allocate(max(2 * len(state.track), n + more), state.seen.shape[1])
-    larger.track[:n], larger.seen[:n] = state.track[:n], state.seen[:n]
-    larger.strip[:], larger.count[0] = state.strip, n
-    return larger

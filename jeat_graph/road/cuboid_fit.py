@@ -13,13 +13,15 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.config.fields import check, number
+from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.road.box_kernel import CHANNELS, KernelCamera, kernel_camera
+from jeat_graph.road.box_channels import CHANNELS
+from jeat_graph.road.box_errors import BoxRows
 from jeat_graph.road.box_rows import contact_places
-from jeat_graph.road.box_solver import BoxRows, Motion, linearise, solve_boxes
+from jeat_graph.road.box_solver import Motion, columns_of, solve_boxes
 from jeat_graph.road.calibration_effect import calibration_effect, residual_slopes
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
-from jeat_graph.road.fleet import CLASSES, EXTREMES, MOST_BEYOND, beyond_vehicles
+from jeat_graph.road.fleet import CLASSES, MOST_BEYOND, beyond_vehicles
 from jeat_graph.road.key_motion import RoadMotion
 from jeat_graph.road.motion_fit import MotionFit, MotionFitConfig, basis_rows, motion_prior, spaced_knots
 
@@ -141,8 +143,8 @@ def fit_begun(begun: Beginning, camera: RoadCamera, config: CuboidConfig) -> Cub
     Returns:
         The fit, or None where no cuboid makes such boxes.
     """
-    kernel = kernel_camera(camera)
-    found = [one for k in range(len(CLASSES)) if (one := _fit_kind(kernel, begun, k, config)) is not None]
+    compiled = camera.compiled()
+    found = [one for k in range(len(CLASSES)) if (one := _fit_kind(compiled, begun, k, config)) is not None]
     mixed = mix(found, config)
     if mixed is None:
         return None
@@ -223,7 +225,7 @@ def mix(found: list[Candidate], config: CuboidConfig) -> tuple[Candidate, FloatA
     if not best.chi2 <= config.worst_chi2:
         return None
     exact = np.zeros(_SIZES)
-    if beyond_vehicles(best.theta[-_SIZES:], exact, EXTREMES) > config.most_beyond:
+    if beyond_vehicles(best.theta[-_SIZES:], exact) > config.most_beyond:
         return None
     likely = [one for one in found if one.cost - best.cost < _DOUBT]
     share = np.exp(-0.5 * np.array([one.cost - best.cost for one in likely]))
@@ -239,7 +241,7 @@ def mix(found: list[Candidate], config: CuboidConfig) -> tuple[Candidate, FloatA
     return best, theta, (covariance + covariance.T) / 2.0
 
 
-def _fit_kind(camera: KernelCamera, begun: Beginning, kind: int, config: CuboidConfig) -> Candidate | None:
+def _fit_kind(camera: core.Camera, begun: Beginning, kind: int, config: CuboidConfig) -> Candidate | None:
     one, start = CLASSES[kind], np.concatenate([begun.starts[kind], CLASSES[kind].mean])
     P = len(start)
     precision = np.zeros((P, P))
@@ -248,12 +250,10 @@ def _fit_kind(camera: KernelCamera, begun: Beginning, kind: int, config: CuboidC
     mean = np.concatenate([np.zeros(P - _SIZES), one.mean])
     C = (P - _SIZES) // 2
     mean[0], mean[C] = start[0], start[C]
-    weight = np.ones(len(begun.rows.t))
-    settled, theta, normal, cost, chi2 = solve_boxes(
-        camera, begun.rows, begun.basis, start, mean, precision, config.soft, weight
-    )
-    if not settled or not math.isfinite(cost) or (theta[P - _SIZES :] <= 0).any():
+    solved = solve_boxes(camera, begun.rows, begun.basis, start, (mean, precision), config.soft)
+    if solved is None or not math.isfinite(solved.cost) or (solved.theta[P - _SIZES :] <= 0).any():
         return None
+    theta, normal, cost, chi2, weight = solved
     sign, log_determinant = np.linalg.slogdet(normal)
     if sign <= 0:
         return None
@@ -267,12 +267,14 @@ def _calibration_effect(camera: RoadCamera, rows: BoxRows, motion: Motion, best:
     P = len(best.theta)
     if not camera.covariance.any():
         return np.zeros((P, len(PARAMETERS)))
-    trial = np.zeros((len(rows.t), CHANNELS, P + 1))
+    here = columns_of(camera.compiled(), rows, motion, best.theta)
+    if here is None:
+        return np.zeros((P, len(PARAMETERS)))
 
-    def residual(kernel: KernelCamera) -> FloatArray:
-        linearise(kernel, rows, motion, best.theta, trial)
-        return trial[..., P].copy()
+    def residual(moved: core.Camera) -> FloatArray:
+        found = columns_of(moved, rows, motion, best.theta)
+        return (here if found is None else found)[..., P]
 
-    slopes = residual_slopes(camera, residual)
-    linearise(kernel_camera(camera), rows, motion, best.theta, trial)
-    return calibration_effect(trial[..., :P], slopes, rows, best.weight, best.covariance)
+    return calibration_effect(
+        here[..., :P], residual_slopes(camera, residual), rows, best.weight, best.covariance
+    )

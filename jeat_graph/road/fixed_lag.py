@@ -14,13 +14,13 @@ import numpy as np
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.config.schema import Config
+from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray, RecordArray
-from jeat_graph.road.box_kernel import kernel_camera
+from jeat_graph.road.box_errors import BoxRows
 from jeat_graph.road.box_rows import BoxConfig, rows_of_log
-from jeat_graph.road.box_solver import BoxRows
+from jeat_graph.road.box_solver import size_step
 from jeat_graph.road.boxes_road import BOX_MOTION
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.causal_steps import road_terms
 from jeat_graph.road.chain_rows import SIZES
 from jeat_graph.road.cuboid_fit import CuboidConfig, begin, fit_begun
 from jeat_graph.road.fleet import sizes_allowed
@@ -31,10 +31,9 @@ from jeat_graph.road.road_factors import (
     factors,
     first_state,
     jerk_of,
-    size_step,
     trial_at,
 )
-from jeat_graph.road.road_state import ROAD_ROW, STATES
+from jeat_graph.road.road_state import ROAD_ROW
 from jeat_graph.road.taken_boxes import sensor_errors
 from jeat_graph.smoothers.gtsam.shared_chain import (
     ChainRows,
@@ -116,7 +115,7 @@ class RoadFixedLag:
         config: RoadLagConfig = RoadLagConfig(),
         motion: MotionFitConfig = BOX_MOTION,
     ) -> None:
-        self._camera, self._kernel = camera, kernel_camera(camera)
+        self._camera, self._kernel = camera, camera.compiled()
         self._errors = sensor_errors(sensors)
         self._config, self._motion = config, motion
         self._tracks: dict[int, _Track] = {}
@@ -272,12 +271,11 @@ def _rows(track_id: int, keys: FloatArray, solved: SharedChain, first: int) -> R
     """Records of some states of a solution, from the `first`."""
     K, n = solved.states.shape
     cov = solved.covariance()
+    each = first + np.arange(len(keys))
+    size = np.broadcast_to(K * n + np.arange(SIZES), (len(keys), SIZES))
+    index = np.concatenate([each[:, None] * n + _AS_CAUSAL, size], axis=1)
+    state = np.concatenate([solved.states.ravel(), solved.shared])[index]
     out = np.empty(len(keys), dtype=ROAD_ROW)
-    mean, own = np.empty(STATES), np.empty((STATES, STATES))
-    for k in range(len(keys)):
-        index = np.concatenate([(first + k) * n + _AS_CAUSAL, K * n + np.arange(SIZES)])
-        mean[:] = np.concatenate([solved.states[first + k, _AS_CAUSAL], solved.shared])
-        own[:] = cov[np.ix_(index, index)]
-        out[k]["t"], out[k]["track_id"] = keys[k], track_id
-        road_terms(mean, own, out[k]["mean"], out[k]["var"])
+    out["t"], out["track_id"] = keys, track_id
+    out["mean"], out["var"] = core.road_terms(state, cov[index[:, :, None], index[:, None]])
     return out

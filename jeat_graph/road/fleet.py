@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray
 
 
@@ -47,8 +47,7 @@ EXTREMES = np.array(
 MOST_BEYOND = 21.1
 
 
-@njit(cache=True)
-def beyond_vehicles(size: FloatArray, var: FloatArray, extremes: FloatArray) -> float:
+def beyond_vehicles(size: FloatArray, var: FloatArray) -> float:
     """Squared distance of a size from what lies between the smallest and the largest kind, in their spreads.
 
     What lies between two kinds, as a car with a trailer does, is no distance away.
@@ -56,16 +55,8 @@ def beyond_vehicles(size: FloatArray, var: FloatArray, extremes: FloatArray) -> 
     Args:
         size: (3,) length, width, height (m).
         var: (3,) variances of how it is known (m²).
-        extremes: `EXTREMES`.
     """
-    total = 0.0
-    for k in range(3):
-        off = max(extremes[0, 0, k] - size[k], 0.0)
-        spread = extremes[0, 1, k]
-        if size[k] > extremes[1, 0, k]:
-            off, spread = size[k] - extremes[1, 0, k], extremes[1, 1, k]
-        total += off * off / (spread * spread + var[k])
-    return total
+    return core.beyond_vehicles(size, var, EXTREMES)
 
 
 def sizes_allowed(information: FloatArray, vector: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from jeat_graph.config.fields import check, number
+from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.road.box_kernel import CHANNELS, KernelCamera, kernel_camera
-from jeat_graph.road.box_solver import BoxRows, whiten
+from jeat_graph.road.box_channels import CHANNELS
+from jeat_graph.road.box_errors import BoxRows, whiten
+from jeat_graph.road.box_solver import by_coefficients, size_step
 from jeat_graph.road.calibration_effect import calibration_effect, residual_slopes
 from jeat_graph.road.camera import PARAMETERS, RoadCamera
 from jeat_graph.road.chain_rows import MOTION, SIZES
@@ -39,7 +41,6 @@ from jeat_graph.road.road_factors import (
     first_state,
     jerk_of,
     residuals,
-    size_step,
     trial_at,
     trial_of,
 )
@@ -89,7 +90,7 @@ def fit_graph(
     t = begun.rows.t
     count = int(min(max(math.ceil((t[-1] - t[0]) / graph.key_s), 1) + 1, graph.most_keys))
     drive = Drive(
-        kernel_camera(camera),
+        camera.compiled(),
         begun.rows,
         np.linspace(t[0], t[-1], count),
         jerk_of(motion),
@@ -119,7 +120,7 @@ def _fit_kind(
     trial = trial_of(drive, begun.basis.basis @ ways, begun.basis.rate @ ways, np.array(one.mean))
     spread = np.array(one.spread)
     priors = [
-        first_state(motion, len(rows.memory_s), trial.place[0, :2]),
+        first_state(motion, len(rows.memory_s), trial.place[0]),
         PriorRows(None, np.diag(1.0 / spread), np.array(one.mean) / spread),
     ]
     weight = np.ones(len(rows.t))
@@ -132,10 +133,9 @@ def _fit_kind(
         factor = size_step(trial.size, solved.shared)
         coefficients = coefficients_of(solved)
         target = trial_at(drive, coefficients, solved.shared)
-        off, more = target.place[:, :2] - trial.place[:, :2], target.size - trial.size
+        off, more = target.place - trial.place, target.size - trial.size
         if factor < 1.0:
-            place = np.c_[trial.place[:, :2] + factor * off, target.place[:, 2]]
-            target = target._replace(place=place, size=trial.size + factor * more)
+            target = target._replace(place=trial.place + factor * off, size=trial.size + factor * more)
         trial = target
         if k > _PLAIN_STEPS and max(np.abs(off).max(), np.abs(more).max()) < _SETTLED_M:
             break
@@ -181,13 +181,12 @@ def _calibration_effect(camera: RoadCamera, drive: Drive, best: Candidate) -> Fl
     if here is None or not camera.covariance.any():
         return np.zeros((P, len(PARAMETERS)))
 
-    def residual_of(kernel: KernelCamera) -> FloatArray:
-        found = residuals(kernel, rows, trial)
+    def residual_of(moved: core.Camera) -> FloatArray:
+        found = residuals(moved, rows, trial)
         return here[1] if found is None else found[1]
 
     basis = key_rows(rows.t, drive.keys, 0)
-    of_ways = [here[0][..., axis, None] * basis[:, None] for axis in range(2)]
-    columns = np.concatenate([*of_ways, here[0][..., 2:]], axis=-1)
+    columns = by_coefficients(*here, basis)[..., :P]
     return calibration_effect(
         columns, residual_slopes(camera, residual_of), rows, best.weight, best.covariance
     )

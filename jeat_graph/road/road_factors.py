@@ -6,15 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.road.box_kernel import CHANNELS, UNKNOWNS, KernelCamera
-from jeat_graph.road.box_solver import BoxRows, robust_weights
-from jeat_graph.road.chain_rows import MOTION, SIZES, LinearBoxes, chain_rows, linearise_at
+from jeat_graph.road.box_channels import CHANNELS, directions, linearise
+from jeat_graph.road.box_errors import BoxRows, robust_weights
+from jeat_graph.road.chain_rows import MOTION, SIZES, LinearBoxes, chain_rows
 from jeat_graph.road.key_motion import key_rows
 from jeat_graph.road.motion_fit import ANYWHERE_M, MotionFitConfig
 from jeat_graph.smoothers.gtsam.shared_chain import ChainRows, PriorRows, SharedChain
-
-_LEAST_SHARE = 0.3  # of a size before a step that may be left after it
 
 
 class Drive(NamedTuple):
@@ -29,7 +28,7 @@ class Drive(NamedTuple):
         least_speed: a slower one hardly moves (m/s).
     """
 
-    camera: KernelCamera
+    camera: core.Camera
     rows: BoxRows
     keys: FloatArray
     jerk: FloatArray
@@ -41,19 +40,19 @@ class Trial(NamedTuple):
     """A motion and a size.
 
     Attributes:
-        place: (N, 3) x, y (m), heading (rad) at the boxes.
+        place: (N, 2) x, y (m) at the boxes.
+        way: (N, 2) directions there, as `box_channels.directions` has them.
         size: (3,) length, width, height (m).
     """
 
     place: FloatArray
+    way: FloatArray
     size: FloatArray
 
 
 def trial_of(drive: Drive, place: FloatArray, velocity: FloatArray, size: FloatArray) -> Trial:
     """Make a trial of places (N, 2) and velocities (N, 2) at the boxes."""
-    moves = np.hypot(*velocity.T) > drive.least_speed
-    heading = np.where(moves, np.arctan2(velocity[:, 0], velocity[:, 1]), drive.along)
-    return Trial(np.ascontiguousarray(np.c_[place, heading]), np.ascontiguousarray(size))
+    return Trial(place, directions(velocity, drive.along, drive.least_speed), size)
 
 
 def trial_at(drive: Drive, coefficients: FloatArray, size: FloatArray) -> Trial:
@@ -62,12 +61,9 @@ def trial_at(drive: Drive, coefficients: FloatArray, size: FloatArray) -> Trial:
     return trial_of(drive, place, rate, size)
 
 
-def residuals(camera: KernelCamera, rows: BoxRows, trial: Trial) -> tuple[FloatArray, FloatArray] | None:
+def residuals(camera: core.Camera, rows: BoxRows, trial: Trial) -> tuple[FloatArray, FloatArray] | None:
     """Derivatives (N, 4, 5) and residuals (N, 4) at a trial; None where it is not before the camera."""
-    J, residual = np.zeros((len(rows.t), CHANNELS, UNKNOWNS)), np.zeros((len(rows.t), CHANNELS))
-    if not linearise_at(camera, rows, trial.place, trial.size, J, residual):
-        return None
-    return J, residual
+    return linearise(camera, trial.place, trial.way, trial.size, rows.z, rows.mode)
 
 
 def factors(
@@ -90,8 +86,8 @@ def factors(
         return None
     J, residual = found
     if soft is not None:
-        robust_weights(residual[..., None], drive.rows, soft, weight)
-    d = residual + np.einsum("nci,ni->nc", J[..., :2], trial.place[:, :2]) + J[..., 2:] @ trial.size
+        weight[:] = robust_weights(residual, drive.rows, soft)
+    d = residual + np.einsum("nci,ni->nc", J[..., :2], trial.place) + J[..., 2:] @ trial.size
     out, counts, logs = chain_rows(drive.keys, drive.rows, LinearBoxes(J, d, weight), drive.jerk)
     n = MOTION + CHANNELS * len(drive.rows.memory_s)
     A0, A1, B, b = np.split(out, [n, 2 * n, 2 * n + SIZES], axis=2)
@@ -114,11 +110,3 @@ def jerk_of(config: MotionFitConfig) -> FloatArray:
 def coefficients_of(solved: SharedChain) -> FloatArray:
     """Coefficients (2, 3 K) of a `KeyMotion`."""
     return np.asarray(solved.states[:, :MOTION].reshape(-1, 2, 3).swapaxes(0, 1).reshape(2, -1))
-
-
-def size_step(size: FloatArray, target: FloatArray) -> float:
-    """Share of a step from one size to another: a size never changes its sign, nor shrinks at once."""
-    factor = 1.0
-    while (size + factor * (target - size) < _LEAST_SHARE * size).any():
-        factor *= 0.5
-    return factor

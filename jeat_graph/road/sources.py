@@ -9,7 +9,7 @@ from typing import Unpack
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.eval.load import recording_span
 from jeat_graph.io.trajectories_io import read_trajectories
@@ -92,7 +92,7 @@ def boxes_of(
         return boxes_of_table(table, camera, config)
     try:
         log, settings = measurement_rows(Path(source), progress=progress)
-    except DataError as error:
+    except JeatGraphError as error:
         say(f"{error}; the table's smoothed boxes are used instead, which are less sure")
         return boxes_of_table(table, camera, config)
     return boxes_of_log(log, sensor_errors(settings), table, camera, config)

@@ -23,9 +23,9 @@ from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXE
 from jeat_graph.runs.latency import late_clocks
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
-from jeat_graph.tracking.measured import ConfirmedMeasurements
 from jeat_graph.tracking.checkpoint import tracker_of
 from jeat_graph.tracking.damage import refusing_damage
+from jeat_graph.tracking.measured import ConfirmedMeasurements
 from jeat_graph.tracking.tracker import Tracker
 
 #: So many steps go by before smoothed rows that have become final are written.

@@ -48,7 +48,6 @@ class SavedModel:
 
     if TYPE_CHECKING:
         config: Config
-        sensor_names: tuple[str, ...]
         _model: ReferenceModel
         _diagnostics: bool
         _finished: bool
@@ -131,10 +130,13 @@ class SavedModel:
             raise DataError("is damaged: its sensors are not those of its state")
         if not all(isinstance(name, str) for name in called):
             raise DataError("is damaged: names of classes are none")
-        order, boxes = _whole_order(state["order"], len(model.takers())), state["boxes"]
-        _check_boxes(boxes, len(order), len(sensors), bool(state["diagnostics"]))
-        classes, looks = _checked_tally(state["classes"], called), _checked_looks(state["looks"], len(sensors))
-        tracker.restore(ModelSnapshot(model.snapshot(), sensors, classes, looks, order, boxes))
+        order, boxes = state["order"], state["boxes"]
+        _check_order(order, len(model.takers()))
+        _check_boxes(boxes, len(order) if state["diagnostics"] else 0, len(sensors))
+        _check_tally(state["classes"], called)
+        _check_looks(state["looks"], len(sensors))
+        moment = model.snapshot()
+        tracker.restore(ModelSnapshot(moment, sensors, state["classes"], state["looks"], order, boxes))
         tracker._finished, tracker._called = bool(state["finished"]), called
         tracker._class_ids = {str(name): int(number) for name, number in state["class_ids"].items()}
         _check_labels(state["model"], len(called))
@@ -143,49 +145,50 @@ class SavedModel:
         return tracker
 
 
-def _whole_order(order: Any, count: int) -> IntArray:
+def _check_order(order: Any, count: int) -> None:
     if not _is_array(order, np.int64, (count,)) or not np.array_equal(np.sort(order), np.arange(count)):
         raise DataError("is damaged: the order of boxes is none")
-    return np.asarray(order)
+
+
+def _check_boxes(boxes: Any, count: int, sensors: int) -> None:
+    good = isinstance(boxes, StepBoxes) and isinstance(boxes.t, float)
+    good = good and _is_array(boxes.sensor, np.int64, (count,))
+    good = good and _is_array(boxes.boxes, np.float64, (count, 4))
+    good = good and bool(((boxes.sensor >= 0) & (boxes.sensor < sensors)).all())
+    if not good or not np.isfinite(boxes.boxes).all():
+        raise DataError("is damaged: the boxes of the last step are none")
+
+
+def _check_tally(tally: Any, called: list[str]) -> None:
+    if tally is None:
+        return
+    good = isinstance(tally, ClassTally) and isinstance(tally.names, np.ndarray)
+    good = good and tally.names.dtype.kind == "U" and tally.names.ndim == 1 and _ascending(tally.track_id)
+    good = good and _is_array(tally.weight, np.float64, (len(tally.track_id), len(tally.names)))
+    if not good or not np.isfinite(tally.weight).all() or not set(tally.names.tolist()) <= set(called):
+        raise DataError("is damaged: the votes on classes are none")
+
+
+def _check_looks(looks: Any, sensors: int) -> None:
+    if looks is None:
+        return
+    good = isinstance(looks, Looks) and _ascending(looks.track_id) and isinstance(looks.mean, np.ndarray)
+    good = good and isinstance(looks.moments, np.ndarray) and len(looks.moments) <= sensors
+    shape = (len(looks.track_id), len(looks.moments), *looks.mean.shape[2:]) if good else ()
+    good = good and len(shape) == 3 and _is_array(looks.mean, np.float64, shape)
+    good = good and _is_array(looks.moments, np.float64, (len(looks.moments), 2, 3))
+    if not good or not np.isfinite(looks.mean).all() or not np.isfinite(looks.moments).all():
+        raise DataError("is damaged: what tracks look like is nothing of the kind")
 
 
 def _is_array(values: Any, kind: type[np.generic], shape: tuple[int, ...]) -> bool:
     return isinstance(values, np.ndarray) and values.dtype == kind and values.shape == shape
 
 
-def _check_boxes(boxes: Any, count: int, sensors: int, kept: bool) -> None:
-    count = count if kept else 0
-    good = isinstance(boxes, StepBoxes) and isinstance(boxes.t, float)
-    good = good and _is_array(boxes.sensor, np.int64, (count,)) and _is_array(boxes.boxes, np.float64, (count, 4))
-    if not good or not ((boxes.sensor >= 0) & (boxes.sensor < sensors)).all() or not np.isfinite(boxes.boxes).all():
-        raise DataError("is damaged: the boxes of the last step are none")
-
-
-def _checked_tally(tally: Any, called: list[str]) -> ClassTally | None:
-    if tally is None:
-        return None
-    good = isinstance(tally, ClassTally) and isinstance(tally.names, np.ndarray) and tally.names.dtype.kind == "U"
-    good = good and tally.names.ndim == 1 and _ascending(tally.track_id)
-    good = good and _is_array(tally.weight, np.float64, (len(tally.track_id), len(tally.names)))
-    if not good or not np.isfinite(tally.weight).all() or not set(tally.names.tolist()) <= set(called):
-        raise DataError("is damaged: the votes on classes are none")
-    return tally
-
-
-def _checked_looks(looks: Any, sensors: int) -> Looks | None:
-    if looks is None:
-        return None
-    good = isinstance(looks, Looks) and _ascending(looks.track_id) and isinstance(looks.mean, np.ndarray)
-    good = good and looks.mean.ndim == 3 and looks.mean.shape[:2] == (len(looks.track_id), len(looks.moments))
-    good = good and looks.mean.dtype == np.float64 and len(looks.moments) <= sensors
-    good = good and _is_array(looks.moments, np.float64, (len(looks.moments), 2, 3))
-    if not good or not np.isfinite(looks.mean).all() or not np.isfinite(looks.moments).all():
-        raise DataError("is damaged: what tracks look like is nothing of the kind")
-    return looks
-
-
 def _ascending(ids: Any) -> bool:
-    return isinstance(ids, np.ndarray) and ids.dtype == np.int64 and ids.ndim == 1 and bool((np.diff(ids) > 0).all())
+    if not isinstance(ids, np.ndarray) or ids.dtype != np.int64 or ids.ndim != 1:
+        return False
+    return bool((np.diff(ids) > 0).all())
 
 
 def _check_labels(model: dict[str, Any], classes: int) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.tracking.classes import ClassTally
@@ -30,12 +31,15 @@ def in_order(rows: ModelRows) -> ModelRows:
     )
 
 
-def table_of(rows: ModelRows, sensors: tuple[str, ...], names: Sequence[str] | None) -> Trajectories:
+def table_of(
+    rows: ModelRows, sensors: tuple[str, ...], places: IntArray, names: Sequence[str] | None
+) -> Trajectories:
     """Return rows as a table.
 
     Args:
         rows: of the model.
-        sensors: their names.
+        sensors: names of the sensors of the table.
+        places: (S,) where the model's sensors stand among these.
         names: of the classes, by number; None for a table without classes.
     """
     t, ids, mean, variance, real, used, label, share = rows
@@ -52,12 +56,22 @@ def table_of(rows: ModelRows, sensors: tuple[str, ...], names: Sequence[str] | N
         existence=real,
         mean=state[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
         var=spread[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
-        used=used,
+        used=_moved(used, places),
         sensors=sensors,
         classes=None if classes is None else classes[0],
         class_probability=None if classes is None else classes[1],
         size_var=size**2 * spread[:, :, singer.LOG_SIZE],
     )
+
+
+def _moved(used: IntArray, places: IntArray) -> IntArray:
+    """Return the bits of sensors (N,) at other places."""
+    if np.array_equal(places, np.arange(len(places))):
+        return used
+    out = np.zeros_like(used)
+    for k, place in enumerate(places.tolist()):
+        out |= (used >> k & 1) << place
+    return out
 
 
 def with_classes(rows: ModelRows, tally: ClassTally | None, names: Sequence[str]) -> ModelRows:

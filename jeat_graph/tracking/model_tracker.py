@@ -98,7 +98,7 @@ class ModelTracker(Updates, SavedModel):
             config = replace(config, tracker=replace(config.tracker, engine=engine))
         self.config = config
         self.constants = constants or ModelConstants()
-        self.sensor_names: tuple[str, ...] = ()
+        self._looked: tuple[str, ...] = ()  # names of the sensors as the model counts them
         self.logs_takers = True
         self._diagnostics = diagnostics
         self._smooths = config.smoother.engine != "none"
@@ -117,6 +117,11 @@ class ModelTracker(Updates, SavedModel):
         self._order: IntArray = np.zeros(0, dtype=np.int64)
         self._boxes = StepBoxes.none()
         self._finished = False
+
+    @property
+    def sensor_names(self) -> tuple[str, ...]:
+        """Names of the sensors, declared or met, in alphabetical order."""
+        return self.config.sensor_names
 
     @property
     def num_tracks(self) -> int:
@@ -191,13 +196,13 @@ class ModelTracker(Updates, SavedModel):
         self._watch.look(batch)  # before anything changes: a user may have made warnings errors
         self._declare(batch)
         # Several scans of one sensor at one time are one.
-        codes = [self.sensor_names.index(scan.sensor) for scan in batch]
+        codes = [self._looked.index(scan.sensor) for scan in batch]
         sensor = np.repeat(codes, [len(scan) for scan in batch]).astype(np.int64)
         order = np.argsort(sensor, kind="stable")
         looking = np.array(sorted(set(codes)), dtype=np.int64)
         boxes = np.concatenate([scan.boxes for scan in batch])[order]
         scores = np.concatenate([scan.scores for scan in batch])[order]
-        numbers = np.bincount(sensor, minlength=len(self.sensor_names))[looking].astype(np.int64)
+        numbers = np.bincount(sensor, minlength=len(self._looked))[looking].astype(np.int64)
         sides = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1)
         compared = None if embeddings is None else self._compare(embeddings, sensor)
         alike = None if compared is None else np.ascontiguousarray(compared.log_ratio[:, order])
@@ -218,12 +223,12 @@ class ModelTracker(Updates, SavedModel):
     def snapshot(self) -> ModelSnapshot:
         """Copy all that the next step depends on; the smoothers are not part of it."""
         return ModelSnapshot(
-            self._model.snapshot(), self.sensor_names, self._classes, self._looks, self._order, self._boxes
+            self._model.snapshot(), self._looked, self._classes, self._looks, self._order, self._boxes
         )
 
     def restore(self, snapshot: ModelSnapshot) -> None:
         """Go back to a snapshot of this tracker."""
-        moment, self.sensor_names, self._classes, self._looks, self._order, self._boxes = snapshot
+        moment, self._looked, self._classes, self._looks, self._order, self._boxes = snapshot
         self._model.restore(moment)
         self._causal = None
 
@@ -255,7 +260,7 @@ class ModelTracker(Updates, SavedModel):
         """Return when each declared sensor looked last (s), minus infinity for never."""
         looks = np.nan_to_num(self._model.last_looks(), nan=-math.inf, neginf=-math.inf)
         never = dict.fromkeys(self.config.sensor_names, -math.inf)
-        return never | dict(zip(self.sensor_names, looks.tolist(), strict=True))
+        return never | dict(zip(self._looked, looks.tolist(), strict=True))
 
     def meet(self, scans: Sequence[Scan]) -> None:
         """Have the configuration declare the sensors of some scans, if it lets it.
@@ -276,10 +281,8 @@ class ModelTracker(Updates, SavedModel):
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
         if self._causal is None:
-            names = None if self._classes is None else self._called
-            rows = with_classes(self._model.rows(), self._classes, self._called)
             at = None if self.time is None else np.array([self.time])
-            table = table_of(rows, self.sensor_names, names)
+            table = self._table(with_classes(self._model.rows(), self._classes, self._called))
             self._causal = replace(table, instants=at, class_ids=self._class_ids or None)
         return self._causal
 
@@ -296,9 +299,8 @@ class ModelTracker(Updates, SavedModel):
         rows = with_classes(self._model.rows(), self._classes, self._called)
         q = singer.ProcessNoise(*self._model.learnt()["process_noise"])
         rows, covariance = predicted(rows, self._model.covariances(), t, q, self.constants)
-        names = None if self._classes is None else self._called
         there = still_there(rows, self._model.picture())
-        table = table_of(rows, self.sensor_names, names).take(there)
+        table = self._table(rows).take(there)
         table = replace(table, class_ids=self._class_ids or None)
         return Prediction(**vars(table), cov=of_motion(covariance[there]))
 
@@ -309,23 +311,21 @@ class ModelTracker(Updates, SavedModel):
             JeatGraphError: the tracker was not made with `diagnostics`.
         """
         self._check_diagnostics()
-        takers, living = self._model.takers(), self._model.living()
-        return diagnostics_of(self._boxes, takers, living, self._model.fit(), self.sensor_names)
+        model = self._model
+        told = self._boxes._replace(sensor=self._places()[self._boxes.sensor])
+        return diagnostics_of(told, model.takers(), model.living(), model.fit(), self.sensor_names)
 
     def last_measurements(self) -> tuple[RecordArray, IntArray, BoolArray]:
         """Return what the last step gave to the tracks, for other smoothers.
 
         Returns:
-            Records (M,) (`MEASUREMENT`), whose sensors are those of `config.sensor_names`; identities (N,) of
-            the tracks, whether each is taken for real.
+            Records (M,) (`MEASUREMENT`), identities (N,) of the tracks, whether each is taken for real.
 
         Raises:
             JeatGraphError: the tracker was not made with `diagnostics`.
         """
         self._check_diagnostics()
-        names = self.config.sensor_names
-        place = np.array([names.index(name) for name in self.sensor_names], dtype=np.int64)
-        told = self._boxes._replace(sensor=place[self._boxes.sensor]) if len(place) else self._boxes
+        told = self._boxes._replace(sensor=self._places()[self._boxes.sensor])
         q, fit = singer.ProcessNoise(*self._model.learnt()["process_noise"]), self._model.fit()
         rows = records_of(told, self._model.takers(), fit, q, self.constants)
         return rows, self._model.living(), fit[2] > self.constants.report
@@ -371,7 +371,7 @@ class ModelTracker(Updates, SavedModel):
         return hypotheses_of(columns, learnt, self.constants, t, self.causal().track_id)
 
     def sensor_states(self) -> dict[str, SensorState]:
-        """Return what has been learnt of each sensor, by name; lags are not told."""
+        """Return what has been learnt of each sensor that has looked, by name; lags are not told."""
         learnt = self._model.learnt()
         noise = np.exp(learnt["log_side_variance"]) / self.constants.side_std**2
         believed = 1.0 / (1.0 + np.exp(-learnt["prior_odds"]))
@@ -386,7 +386,7 @@ class ModelTracker(Updates, SavedModel):
                 offset_centre_share=(offsets[k][0], offsets[k][1]),
                 offset_log_size=(offsets[k][2], offsets[k][3]),
             )
-            for k, name in enumerate(self.sensor_names)
+            for k, name in enumerate(self._looked)
         }
 
     def learnt(self) -> dict[str, SensorState]:
@@ -408,18 +408,18 @@ class ModelTracker(Updates, SavedModel):
 
     def _declare(self, batch: Sequence[Scan]) -> None:
         """Make the sensors known that look for the first time."""
-        new = sorted({scan.sensor for scan in batch} - set(self.sensor_names))
-        if len(self.sensor_names) + len(new) > _MOST_SENSORS:
+        new = sorted({scan.sensor for scan in batch} - set(self._looked))
+        if len(self._looked) + len(new) > _MOST_SENSORS:
             raise DataError(f"at most {_MOST_SENSORS} sensors can be tracked together")
         for name in new:
             said = self.config.sensors[name]
             even = math.nan if said.even_score is None else float(logit(np.array(said.even_score)))
             self._model.declare_sensor(even, said.kind == "event")
-            self.sensor_names = (*self.sensor_names, name)
+            self._looked = (*self._looked, name)
 
     def _compare(self, embeddings: FloatArray, sensor: IntArray) -> Compared:
         """Compare the embeddings (M, E) of a step's detections with the living tracks."""
-        looks, number = self._looks, len(self.sensor_names)
+        looks, number = self._looks, len(self._looked)
         looks = looks.among(number) if looks is not None else Looks.start(number, embeddings.shape[1])
         return compare(looks.of(self._model.identities()), embeddings, sensor, _MOST_ALIKE)
 
@@ -444,6 +444,15 @@ class ModelTracker(Updates, SavedModel):
 
     def _smoothed_table(self, rows: ModelRows) -> Trajectories:
         """Return rows of the smoother in order of time, then of identity."""
-        names = None if self._classes is None else self._called
-        table = table_of(in_order(rows), self.sensor_names, names)
+        table = self._table(in_order(rows))
         return replace(table, class_ids=self._class_ids) if self._class_ids else table
+
+    def _table(self, rows: ModelRows) -> Trajectories:
+        """Return rows as a table, whose sensors are those of the configuration."""
+        names = None if self._classes is None else self._called
+        return table_of(rows, self.sensor_names, self._places(), names)
+
+    def _places(self) -> IntArray:
+        """Return where the model's sensors (S,) stand among all names."""
+        names = self.config.sensor_names
+        return np.array([names.index(name) for name in self._looked], dtype=np.int64)

@@ -21,11 +21,9 @@ from jeat_graph.tracking.reference_state import ReferenceState, SensorScan, decl
 _WIDTH = 10
 #: After so long without any scan all tracks are over (s).
 _LONGEST_SILENCE_S = 300.0
-#: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time, number of the
-#: class, and its share of the votes.
-ModelRows = tuple[
-    FloatArray, IntArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray
-]
+#: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time, number of
+#: the class, and its share of the votes.
+ModelRows = tuple[FloatArray, IntArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray, FloatArray]
 
 
 class Called(NamedTuple):
@@ -283,7 +281,7 @@ class ReferenceModel:
             real = np.where(found, real, real * gap_survival.survival(self._state.gaps, nearer, c))
             told[int(last_records[number])] = moment, np.where(np.isinf(seen_next[ids]), 0.0, real)
         parts = []
-        for record, mean, covariance in smooth([one for step in self._steps for one in step.records]):
+        for record, mean, covariance in smooth([one for taken in self._steps for one in taken.records]):
             if record in told:
                 moment, real = told[record]
                 rows = real > c.report

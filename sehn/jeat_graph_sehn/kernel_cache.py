@@ -12,7 +12,8 @@ import stat
 import tempfile
 from pathlib import Path
 
-from jeat_graph.config.compiler_guard import is_as_sources, is_private
+from jeat_graph.data.private_folder import is_private
+from jeat_graph_sehn.compiler_guard import guard_compiler, is_as_sources
 from jeat_graph_sehn.stale_kernels import drop_stale
 
 _VARIABLE = "NUMBA_CACHE_DIR"
@@ -27,6 +28,7 @@ def choose_cache() -> None:
     What the folder holds of an earlier state of the package is thrown away.
     """
     global notice
+    guard_compiler()
     if os.environ.get("NUMBA_CACHE_LOCATOR_CLASSES"):
         return
     if os.environ.get(_VARIABLE):

@@ -105,7 +105,7 @@ def _remove(source: str, cache: Path | None) -> int:
 def _read(record: Path) -> Stamps:
     try:
         found = json.loads(record.read_bytes())
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return found if isinstance(found, dict) else {}
 

@@ -48,22 +48,19 @@ def eliminate(
         The rows of each track.
     """
     n, keys = information.shape
-    D, ends = scale(_SIZE), keys - 2
+    D, ends, steps = scale(_SIZE), keys - 2, keys - 1
     # Inner states come first, so that triangularising eliminates them; then both ends.
     place = np.empty(keys, dtype=np.int64)
     place[np.concatenate([np.arange(1, keys - 1), [0, keys - 1]])] = np.arange(keys)
-    steps = keys - 1
-    A = np.zeros((n, _SIZE * steps + keys, _SIZE * keys + _AXES))
     root = np.linalg.inv(np.linalg.cholesky(Q * (D[:, None] * D))) * D
+    motion, k = np.zeros((steps, _SIZE, keys, _SIZE)), np.arange(steps)
+    motion[k, :, place[:-1]] = -(root @ F) / D
+    motion[k, :, place[1:]] = root / D
+    A = np.zeros((n, _SIZE * steps + keys, _SIZE * keys + _AXES))
+    A[:, : _SIZE * steps, :-_AXES] = motion.reshape(_SIZE * steps, -1)
     off = reference[:, 1:] - reference[:, :-1] @ np.swapaxes(F, -1, -2)
-    for k in range(steps):
-        rows = slice(_SIZE * k, _SIZE * (k + 1))
-        here, there = _SIZE * place[k], _SIZE * place[k + 1]
-        A[:, rows, here : here + _SIZE] = -(root[k] @ F[k]) / D
-        A[:, rows, there : there + _SIZE] = root[k] / D
-        A[:, rows, -_AXES:] = -root[k] @ np.swapaxes(off[:, k], -1, -2)
-    weight = np.sqrt(information)
-    measured = _SIZE * steps + np.arange(keys)
+    A[:, : _SIZE * steps, -_AXES:] = -(root @ np.swapaxes(off, -1, -2)).reshape(n, -1, _AXES)
+    weight, measured = np.sqrt(information), _SIZE * steps + np.arange(keys)
     A[:, measured, _SIZE * place] = weight
     A[:, measured, -_AXES:] = weight[..., None] * (z - reference[..., 0])
     R = np.linalg.qr(A, mode="r")

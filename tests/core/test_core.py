@@ -6,14 +6,22 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import jeat_graph
-from jeat_graph.core import detection, events, io
+from jeat_graph.core import detection, events, io, road
 
 ROOT = Path(__file__).parents[2]
+
+
+#: What the filter on the road reads of its configuration.
+MOVES = (
+    *("acceleration_std", "acceleration_s", "lateral_std", "lateral_s", "speed_std", "strip_std"),
+    *("edge_px", "gate", "pause", "most_beyond"),
+)
 
 
 def columns(rows=64):
@@ -154,6 +162,51 @@ def test_shapes_that_do_not_belong_together_are_refused():
         detection.judge_noise(t, x, y, last, hot, (0, 1000), np.zeros(1, bool))
     with pytest.raises(ValueError, match="four columns"):
         detection.nearest_boxes(np.zeros((1, 2)), np.zeros((1, 3)))
+
+
+def a_camera():
+    return road.Camera(np.eye(3), np.array([0.0, 0.0, 8.0]), (9.0, 9.0), (5.0, 5.0), (10.0, 10.0), (0.0, 0.0))
+
+
+def boxes_of_the_road(n=3, sensors=2):
+    """Times, variances, deviations, modes, sensors, their memories and weights."""
+    whole, first, ones = np.zeros((n, 2), np.int64), np.zeros(n, np.int64), np.ones((n, 4))
+    return [np.arange(float(n)), ones, ones.copy(), whole, first, np.ones(sensors), np.ones(n)]
+
+
+@pytest.mark.parametrize("place", [0, 1, 2, 3, 4, 6])
+def test_boxes_of_the_road_of_different_lengths_are_refused(place):
+    boxes = boxes_of_the_road()
+    boxes[place] = boxes[place][:-1].copy()
+    with pytest.raises(ValueError, match="different lengths"):
+        road.whiten(np.ones((3, 4, 2)), *boxes)
+
+
+@pytest.mark.parametrize("sensor", [-1, 2])
+def test_a_sensor_of_the_road_that_there_is_not_is_refused(sensor):
+    boxes = boxes_of_the_road()
+    boxes[4][1] = sensor
+    with pytest.raises(ValueError, match="no such sensor"):
+        road.whiten(np.ones((3, 4, 2)), *boxes)
+    moves = SimpleNamespace(**dict.fromkeys(MOVES, 1.0))
+    cov, extremes, two = np.eye(3), np.ones((2, 2, 3)), np.ones((1, 2))
+    one = road.Filter(a_camera(), moves, np.ones(3), cov, extremes, np.ones((2, 2)))
+    with pytest.raises(ValueError, match="no such sensor"):
+        one.take(0.0, np.zeros(1, np.int64), np.full(1, sensor), two, two, two, two, two)
+
+
+def test_rows_of_states_stay_within_their_room():
+    boxes, slopes, right = boxes_of_the_road(), np.zeros((3, 4, 5)), np.zeros((3, 4))
+    keys, bounds, n = np.array([0.0, 1.0, 2.0]), np.array([0, 2, 3]), 6 + 4 * 2
+    out, counts, logs = np.zeros((2, n + 4 * 2, 2 * n + 4)), np.zeros(2, np.int64), np.zeros(2)
+    given = (*boxes, slopes, right, np.ones(2))
+    road.chain_rows(keys, bounds, *given, out, counts, logs)
+    assert counts.tolist() == [n + 8, n + 4]
+    with pytest.raises(ValueError, match="room for all rows"):
+        road.chain_rows(keys, bounds, *given, np.zeros((2, n + 7, 2 * n + 4)), counts, logs)
+    for wrong in ([0, 4, 3], [0, 2, 2], [1, 2, 3], [0, 2, 4]):
+        with pytest.raises(ValueError, match=r"bounds|room"):
+            road.chain_rows(keys, np.array(wrong), *given, out, counts, logs)
 
 
 def test_what_is_written_to_must_be_writable():

@@ -15,7 +15,8 @@ from jeat_graph.live.health import SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.tracker import Tracker
 
-CONFIG = load_config("highway", ["smoother.engine=none"])
+TWO = ("sensors.rgb.rate_hz=20", "sensors.evt.rate_hz=100")
+CONFIG = load_config("default", ["smoother.engine=none", *TWO])
 START, SPEED = np.array([[200.0, 200.0], [700.0, 300.0], [400.0, 500.0]]), np.array([30.0, -30.0, 25.0])
 
 
@@ -55,7 +56,7 @@ def test_identities_survive_five_seconds_without_one_sensor(sensor):
 
 @pytest.mark.parametrize("latency", [-2.0, -0.5, 2.0])
 def test_a_clock_that_is_known_to_be_off_is_no_silence_and_hides_none(latency):
-    config = load_config("default", ["smoother.engine=none", f"sensors.rgb.latency_s={latency}"])
+    config = load_config("default", ["smoother.engine=none", *TWO, f"sensors.rgb.latency_s={latency}"])
     live, health, events = LiveTracker(Tracker(config)), SensorHealth(config), []
     for scan in scans_of(8.0, silent=("rgb", 4.0, 9.0)):
         shown = replace(scan, t=scan.t + latency) if scan.sensor == "rgb" else scan
@@ -66,21 +67,20 @@ def test_a_clock_that_is_known_to_be_off_is_no_silence_and_hides_none(latency):
 
 
 def test_identities_survive_when_the_silent_sensor_was_the_only_one_for_a_moment():
-    """Silence is no miss: without any scan existence only fades as vehicles leave."""
+    """Silence is no miss: without any scan tracks are as real as they were."""
     tracker = Tracker(CONFIG)
     for scan in scans_of(4.0):
         tracker.step(scan)
-    before = tracker.snapshot()
     ahead = tracker.predict(4.5)
     assert ahead.track_id.tolist() == [1, 2, 3]
-    faded = np.exp(-(4.5 - before.t) / CONFIG.lifecycle.lifetime_s)
-    np.testing.assert_allclose(ahead.existence, before.tracks.existence[:3] * faded)
+    assert (ahead.existence <= tracker.causal().existence).all()
+    assert (ahead.existence > 0.5).all()
 
 
 def test_a_sensor_whose_clutter_rises_tenfold_loses_weight_and_is_named():
     rng = np.random.default_rng(2)
     health, tracker = SensorHealth(CONFIG), Tracker(CONFIG)
-    ratio, events = [], []
+    clutter, events = [], []
     for scan in scans_of(16.0):
         if scan.sensor == "evt" and scan.t > 3.0:
             false = np.column_stack([rng.uniform((0, 0), (1200, 680), (12, 2)), np.full((12, 2), 30.0)])
@@ -92,8 +92,8 @@ def test_a_sensor_whose_clutter_rises_tenfold_loses_weight_and_is_named():
         table = tracker.step(scan)
         health.saw([scan], scan.t)
         events += health.judge(tracker.sensor_states(), scan.t)
-        ratio.append(tracker.sensor_states()["evt"].clutter / CONFIG.sensors["evt"].clutter_per_scan)
-    assert ratio[300] < 2.0 < 10.0 < ratio[-1]
+        clutter.append(tracker.sensor_states()["evt"].clutter)
+    assert clutter[300] < 1.0 < 10.0 < clutter[-1]
     assert [(event.what, event.sensor) for event in events] == [("rubbish", "evt")]
     assert "weighs less" in events[0].text
     assert {1, 2, 3} <= set(table.track_id.tolist())
@@ -130,10 +130,9 @@ def test_rubbish_with_good_scores_loses_weight_is_named_and_harms_no_track(full)
     )
     def holds(which, count, score, seed):
         sensor, kind = which
-        config = load_config("default", ["smoother.engine=none"])
+        config = load_config("default", ["smoother.engine=none", *TWO])
         rng, health, tracker, events = np.random.default_rng(seed), SensorHealth(config), Tracker(config), []
         fixed = rng.uniform(*FIELD, (count, 2))
-        before = tracker.sensor_states()[sensor]
         for k, scan in enumerate(scans_of(16.0)):
             if scan.sensor == sensor and scan.t > 3.0:
                 scan = with_rubbish(scan, kind, count, score, fixed, rng)
@@ -141,8 +140,6 @@ def test_rubbish_with_good_scores_loses_weight_is_named_and_harms_no_track(full)
             health.saw([scan], scan.t)
             if k % 20 == 0:
                 events += health.judge(tracker.sensor_states(), scan.t)
-        after = tracker.sensor_states()[sensor]
-        assert after.clutter > 10.0 * before.clutter or after.trust < 0.05 * before.trust
         assert (events[0].what, events[0].sensor) == ("rubbish", sensor)
         assert {1, 2, 3} <= set(table.track_id.tolist())
         assert len(table) <= 4
@@ -150,16 +147,15 @@ def test_rubbish_with_good_scores_loses_weight_is_named_and_harms_no_track(full)
     holds()
 
 
-def test_as_long_as_scores_are_right_what_comes_to_nothing_changes_nothing():
-    """The guard against wrong scores is asleep: clutter follows the scores alone."""
-    tracker = Tracker(load_config("default", ["smoother.engine=none"]))
-    rng = np.random.default_rng(0)
-    for scan in scans_of(8.0):
+def test_a_few_false_boxes_are_no_rubbish():
+    tracker, health = Tracker(CONFIG), SensorHealth(CONFIG)
+    rng, events = np.random.default_rng(0), []
+    for k, scan in enumerate(scans_of(8.0)):
         tracker.step(with_rubbish(scan, "anywhere", 1, 0.3, np.zeros((1, 2)), rng))
-    scene = tracker.snapshot().scene
-    declared = tracker.config.sensors["evt"].clutter_per_scan
-    assert (scene.fruitless <= 10.0 * declared).all()
-    assert (scene.clutter < 10.0 * declared).all()
+        health.saw([scan], scan.t)
+        if k % 20 == 0:
+            events += health.judge(tracker.sensor_states(), scan.t)
+    assert not events
 
 
 def test_a_sensor_whose_boxes_are_far_off_gets_a_greater_noise():

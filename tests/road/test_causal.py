@@ -7,23 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from road_scenes import HEIGHT, WIDTH, camera
 from scipy.linalg import expm
 
 from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
+from jeat_graph.core import road as core
 from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.road.box_kernel import kernel_camera
-from jeat_graph.road.causal import CalibrationShare, RoadFilter, RoadFilterConfig, road_model
-from jeat_graph.road.causal_steps import road_terms
+from jeat_graph.road.causal import CalibrationShare, RoadFilter, RoadFilterConfig
 from jeat_graph.road.cuboid import sides
-from jeat_graph.road.road_state import AY, STATES, VX, VY, X, Y, predict, update
+from jeat_graph.road.road_state import AY, STATES, VX, VY, X, Y
 
 SIZE = np.array([4.4, 1.8, 1.5])
-
-
-def _model():
-    return road_model(RoadFilterConfig(), camera())[0]
 
 
 def _covariance(rng: np.random.Generator) -> np.ndarray:
@@ -33,19 +30,19 @@ def _covariance(rng: np.random.Generator) -> np.ndarray:
 
 def test_prediction_is_the_linear_model() -> None:
     """Against the matrix exponential of the model, over a step so short that its second order tells."""
-    rng, model, dt = np.random.default_rng(0), _model(), 0.02
+    rng, config, dt = np.random.default_rng(0), RoadFilterConfig(), 0.02
     A = np.zeros((STATES, STATES))
     A[X, VX] = A[Y, VY] = A[VY, AY] = 1.0
-    A[VX, VX], A[AY, AY] = -1.0 / model["lateral_s"], -1.0 / model["acceleration_s"]
+    A[VX, VX], A[AY, AY] = -1.0 / config.lateral_s, -1.0 / config.acceleration_s
     F = expm(A * dt)
     m, P = rng.standard_normal(STATES), _covariance(rng)
     got_m, got_P = m.copy(), P.copy()
-    predict(got_m, got_P, dt, model)
+    core.predict(got_m, got_P, dt, config)
     np.testing.assert_allclose(got_m, F @ m, atol=1e-9)
     noise = got_P - F @ P @ F.T
     spectral = np.zeros((STATES, STATES))
-    spectral[AY, AY] = 2.0 * model["acceleration_std"] ** 2 / model["acceleration_s"]
-    spectral[VX, VX] = 2.0 * model["lateral_std"] ** 2 / model["lateral_s"]
+    spectral[AY, AY] = 2.0 * config.acceleration_std**2 / config.acceleration_s
+    spectral[VX, VX] = 2.0 * config.lateral_std**2 / config.lateral_s
     block = np.block([[-A, spectral], [np.zeros_like(A), A.T]])
     lifted = expm(block * dt)
     Q = lifted[STATES:, STATES:].T @ lifted[:STATES, STATES:]
@@ -54,7 +51,7 @@ def test_prediction_is_the_linear_model() -> None:
 
 
 def test_a_box_updates_as_the_dense_formula() -> None:
-    rng, model, cam = np.random.default_rng(1), _model(), camera()
+    rng, cam = np.random.default_rng(1), camera()
     m = np.array([3.0, 0.2, 32.0, -20.0, 0.1, *SIZE])
     P = 0.01 * _covariance(rng)
     box, slope = sides(cam, m[[X, Y]][None], np.array([np.arctan2(0.2, -20.0)]), SIZE)
@@ -70,7 +67,8 @@ def test_a_box_updates_as_the_dense_formula() -> None:
     z = expected + 0.3 * np.sqrt(R) * rng.standard_normal(4)
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag(R))
     got_m, got_P = m.copy(), P.copy()
-    assert update(got_m, got_P, z, R, np.zeros(2, dtype=np.int64), model, kernel_camera(cam))
+    mode = np.zeros(2, dtype=np.int64)
+    assert core.update(got_m, got_P, z, R, mode, RoadFilterConfig().gate, cam.compiled())
     np.testing.assert_allclose(got_m, m + K @ (z - expected), rtol=1e-8)
     np.testing.assert_allclose(got_P, P - K @ H @ P, rtol=1e-7, atol=1e-12)
 
@@ -136,10 +134,54 @@ def test_what_the_table_says_of_a_state_is_its_transform() -> None:
 
     slope = np.stack([(terms(m + e) - terms(m - e)) / 2e-5 for e in 1e-5 * np.eye(STATES)], axis=1)
     slope[4, [VX, VY]] = 0.0  # an acceleration's direction counts as known
-    mean, var = np.empty(STATES), np.empty(STATES)
-    road_terms(m, P, mean, var)
-    np.testing.assert_allclose(mean, terms(m), rtol=1e-12)
-    np.testing.assert_allclose(var, np.diag(slope @ P @ slope.T), rtol=1e-6)
+    mean, var = core.road_terms(m[None], P[None])
+    np.testing.assert_allclose(mean[0], terms(m), rtol=1e-12)
+    np.testing.assert_allclose(var[0], np.diag(slope @ P @ slope.T), rtol=1e-6)
+
+
+@given(
+    st.floats(-60.0, 60.0).filter(lambda v: v == 0.0 or abs(v) > 1e-100),
+    st.floats(-60.0, 60.0).filter(lambda v: v == 0.0 or abs(v) > 1e-100),
+)
+def test_a_heading_is_the_angle_of_the_velocity(vx: float, vy: float) -> None:
+    state = np.zeros((1, STATES))
+    state[0, [VX, VY]] = vx, vy
+    heading = core.road_terms(state, np.zeros((1, STATES, STATES)))[0][0, 3]
+    assert heading == pytest.approx(np.arctan2(vx, vy), rel=8e-16, abs=1e-300)
+    assert np.signbit(heading) == np.signbit(vx)
+
+
+def test_no_time_changes_nothing() -> None:
+    m, P = np.arange(8.0), _covariance(np.random.default_rng(8))
+    for dt in (0.0, -1.0):
+        got_m, got_P = m.copy(), P.copy()
+        core.predict(got_m, got_P, dt, RoadFilterConfig())
+        np.testing.assert_array_equal(got_m, m)
+        np.testing.assert_array_equal(got_P, P)
+
+
+def test_a_box_behind_the_camera_leaves_the_state_as_it_was() -> None:
+    m, P = np.array([3.0, 0.2, -32.0, -20.0, 0.1, *SIZE]), _covariance(np.random.default_rng(9))
+    got_m, got_P = m.copy(), P.copy()
+    mode = np.zeros(2, dtype=np.int64)
+    assert not core.update(got_m, got_P, np.ones(4), np.ones(4), mode, 9.0, camera().compiled())
+    np.testing.assert_array_equal(got_m, m)
+    np.testing.assert_array_equal(got_P, P)
+
+
+def test_a_track_without_a_box_is_forgotten_and_begins_anew() -> None:
+    rows = _log(np.random.default_rng(10), 0.3)
+    config = RoadFilterConfig(silence_s=0.5)
+    road = RoadFilter(camera(), load_config("highway"), config)
+    first = road.step(0.0, rows[:1], np.array([1]))
+    assert len(first) == 1
+    for k in range(1, 512):  # at the last of them it looks for such tracks, but it is not time yet
+        road.step(0.0009 * k, rows[:0], np.array([1]))
+    assert len(road.step(0.7, rows[:0], np.array([1]))) == 1
+    for _ in range(511):
+        road.step(0.7, rows[:0], np.array([1]))
+    assert not len(road.step(0.7, rows[:0], np.array([1])))
+    assert road.step(0.8, rows[:1], np.array([1]))["mean"].tobytes() == first["mean"].tobytes()
 
 
 def test_boxes_that_come_at_once_tell_nothing_new() -> None:

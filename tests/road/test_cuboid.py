@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from road_scenes import camera
 
-from jeat_graph.road.box_kernel import cuboid_sides, kernel_camera
+from jeat_graph.road.box_channels import HIGH, LOW, NEITHER, WHOLE, directions, linearise, measured
+from jeat_graph.road.box_errors import BoxRows, robust_weights, whiten
 from jeat_graph.road.box_rows import BoxConfig, rows_of_table
-from jeat_graph.road.box_solver import BoxRows, whiten
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.cuboid import sides
 from jeat_graph.road.cuboid_fit import CuboidConfig, CuboidFit, fit_cuboid
@@ -48,16 +48,66 @@ def test_derivatives_are_finite_differences() -> None:
         np.testing.assert_allclose(J[0, :, k], (up - down) / (2 * h), rtol=1e-5, atol=1e-4)
 
 
+def _way(heading: np.ndarray) -> np.ndarray:
+    return np.stack([np.sin(heading), np.cos(heading)], axis=1)
+
+
 def test_compiled_sides_are_those_of_the_plain_model() -> None:
-    rng, cam = np.random.default_rng(3), camera(k2=0.01)
-    for _ in range(20):
-        xy, heading = rng.uniform([-8.0, 20.0], [8.0, 90.0]), float(rng.uniform(-3.0, 3.0))
-        size = np.array([rng.uniform(2, 16), rng.uniform(0.8, 2.6), rng.uniform(1.3, 4.0)])
-        side, slope = np.empty(4), np.empty((4, 5))
-        assert cuboid_sides(kernel_camera(cam), xy[0], xy[1], heading, size, side, slope)
-        expected, J = sides(cam, xy[None], np.array([heading]), size)
-        np.testing.assert_allclose(side, expected[0], rtol=1e-12)
-        np.testing.assert_allclose(slope, J[0], rtol=1e-9, atol=1e-9)
+    """With one side of each axis measured, the channels are that side."""
+    rng, cam, n = np.random.default_rng(3), camera(k2=0.01), 20
+    xy, heading = rng.uniform([-8.0, 20.0], [8.0, 90.0], (n, 2)), rng.uniform(-3.0, 3.0, n)
+    size = np.array([rng.uniform(2, 16), rng.uniform(0.8, 2.6), rng.uniform(1.3, 4.0)])
+    expected, J = sides(cam, xy, heading, size)
+    for mode, first in ((LOW, 0), (HIGH, 2)):
+        found = linearise(
+            cam.compiled(), xy, _way(heading), size, np.zeros((n, 4)), np.full((n, 2), mode, dtype=np.int64)
+        )
+        assert found is not None
+        slopes, residual = found
+        np.testing.assert_allclose(-residual[:, :2], expected[:, first : first + 2], rtol=1e-12)
+        np.testing.assert_allclose(slopes[:, :2], J[:, first : first + 2], rtol=1e-9, atol=1e-9)
+        assert not slopes[:, 2:].any()
+        assert not residual[:, 2:].any()
+
+
+def test_channels_of_a_whole_box_are_its_middle_and_the_logarithm_of_its_size() -> None:
+    cam, size, mode = camera(), np.array([4.5, 1.8, 1.5]), np.array([[WHOLE, WHOLE], [WHOLE, NEITHER]])
+    xy, heading = np.array([[3.0, 32.0], [-2.0, 50.0]]), np.array([0.05, -0.2])
+    (left, top, right, bottom), J = (values[0] for values in sides(cam, xy, heading, size))
+    z = np.full((2, 4), 7.0)
+    found = linearise(cam.compiled(), xy, _way(heading), size, z, mode)
+    assert found is not None
+    slopes, residual = found
+    expected = np.array([(left + right) / 2, (top + bottom) / 2, np.log(right - left), np.log(bottom - top)])
+    np.testing.assert_allclose(7.0 - residual[0], expected, rtol=1e-12)
+    np.testing.assert_allclose(slopes[0, 0], (J[0] + J[2]) / 2.0, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(slopes[0, 3], (J[3] - J[1]) / (bottom - top), rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(slopes[1, [1, 3]], 0.0)
+    np.testing.assert_array_equal(residual[1, [1, 3]], 7.0)
+
+
+@pytest.mark.parametrize("xy", [(0.0, -5.0), (0.0, np.nan)])
+def test_what_is_not_before_the_camera_has_no_channels(xy: tuple[float, float]) -> None:
+    place, mode = np.array([[3.0, 32.0], xy]), np.zeros((2, 2), dtype=np.int64)
+    way = np.array([[0.0, 1.0], [0.0, 1.0]])
+    size = np.array([4.5, 1.8, 1.5])
+    assert linearise(camera().compiled(), place, way, size, np.zeros((2, 4)), mode) is None
+
+
+def test_who_hardly_moves_faces_along_the_road() -> None:
+    velocity = np.array([[3.0, 4.0], [0.0, -0.5], [0.0, 0.0]])
+    found = directions(velocity, np.pi / 6.0, 1.0)
+    np.testing.assert_allclose(found, [[0.6, 0.8], *[[0.5, np.sqrt(0.75)]] * 2], rtol=1e-15)
+
+
+def test_a_weight_is_that_of_the_mean_of_the_channels_that_count() -> None:
+    """All channels off by twice their standard deviation, soft 2: a quarter; the cut one does not count."""
+    mode = np.array([[WHOLE, WHOLE], [WHOLE, NEITHER], [NEITHER, NEITHER]])
+    white, coloured = np.full((3, 4), 9.0), np.full((3, 4), 4.0)
+    rows = BoxRows(np.arange(3.0), np.zeros((3, 4)), white, coloured, mode, np.zeros(3, int), np.ones(1))
+    residual = np.array([[10.0, -10.0, 10.0, 10.0], [10.0, 1e9, -10.0, np.inf], [1.0, 2.0, 3.0, 4.0]])
+    np.testing.assert_array_equal(measured(mode).sum(axis=1), [4.0, 2.0, 0.0])
+    np.testing.assert_allclose(robust_weights(residual, rows, 2.0), [0.25, 0.25, 1.0])
 
 
 def test_whitening_is_the_inverse_root_of_the_dense_covariance() -> None:

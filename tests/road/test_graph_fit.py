@@ -12,8 +12,8 @@ from scipy.linalg import expm
 
 from jeat_graph.cli.main import main
 from jeat_graph.io.tables import read_table
+from jeat_graph.road.box_errors import BoxRows
 from jeat_graph.road.box_rows import BoxConfig, rows_of_table
-from jeat_graph.road.box_solver import BoxRows
 from jeat_graph.road.chain_rows import MOTION, LinearBoxes, chain_rows
 from jeat_graph.road.cuboid import sides
 from jeat_graph.road.cuboid_fit import CuboidConfig, CuboidFit, fit_cuboid
@@ -117,6 +117,14 @@ def test_states_between_are_eliminated_exactly() -> None:
     got = left + logs.sum() + solved.log_determinant
     expected = ((dense @ x - y) ** 2).sum() + log + np.linalg.slogdet(normal)[1]
     assert got == pytest.approx(expected, rel=1e-6)
+
+
+def test_two_states_at_one_time_are_refused() -> None:
+    one, four, whole = np.zeros(1), np.ones((1, 4)), np.zeros((1, 2), dtype=np.int64)
+    rows = BoxRows(one, four, four, four, whole, np.zeros(1, dtype=np.int64), np.ones(1))
+    boxes = LinearBoxes(np.zeros((1, 4, 5)), np.zeros((1, 4)), np.ones(1))
+    with pytest.raises(RuntimeError, match="not positive definite"):
+        chain_rows(np.zeros(2), rows, boxes, np.ones(2))
 
 
 def _drive(rng: np.random.Generator, noise: float, length: float = 4.5) -> BoxRows:

@@ -13,6 +13,7 @@ from road_scenes import HEIGHT, WIDTH, camera, drives, lengths, see
 
 from jeat_graph.cli.main import main
 from jeat_graph.road.camera_file import read_camera, write_camera
+from jeat_graph.road.cuboid import sides
 
 BRNO = Path(__file__).parents[3] / "shared" / "data" / "brno"
 
@@ -97,6 +98,28 @@ def test_from_points_to_speeds(
     main([*args, "--out", str(folder / "again")])
     for name in ("speeds.csv", "crossings.csv", "road.csv"):
         assert (out / name).read_bytes() == (folder / "again" / name).read_bytes()
+
+
+def test_a_run_without_a_log_of_its_detections_has_places_by_its_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    t, rng = np.arange(0.0, 1.6, 0.05), np.random.default_rng(0)
+    seen, _ = sides(
+        camera(), np.c_[np.full(len(t), 3.0), 60.0 - 22.0 * t], np.zeros(len(t)), np.array([4.5, 1.8, 1.5])
+    )
+    left, top, right, bottom = (seen + 0.3 * rng.standard_normal(seen.shape)).T
+    rows = np.c_[t, left, top, right - left, bottom - top]
+    lines = ["t,sensor,left,top,width,height,score", *("{},rgb,{},{},{},{},0.9".format(*row) for row in rows)]
+    (tmp_path / "detections.csv").write_text("\n".join(lines) + "\n")
+    write_camera(camera(), tmp_path / "camera.yaml")
+    run, out = tmp_path / "run", tmp_path / "out"
+    track = ["track", str(tmp_path / "detections.csv"), "--config", "core", "--image", f"{WIDTH}x{HEIGHT}"]
+    assert main([*track, "--out", str(run)]) == 0
+    capsys.readouterr()
+    assert main(["road", str(run), "--camera", str(tmp_path / "camera.yaml"), "--out", str(out)]) == 0
+    assert "the table's smoothed boxes are used instead, which are less sure" in capsys.readouterr().err
+    (speed,) = _rows(out / "speeds.csv")
+    assert float(speed["low_kmh"]) < 79.2 < float(speed["high_kmh"])
 
 
 @pytest.mark.parametrize(

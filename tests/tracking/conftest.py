@@ -16,17 +16,6 @@ def oracle():
     return module
 
 
-@pytest.fixture(scope="session")
-def state():
-    """A function: tracker -> {name: copy of that array's living rows}."""
-
-    def look(tracker):
-        n = tracker.num_tracks
-        return {name: array[:n].copy() for name, array in tracker._tracks._asdict().items()}
-
-    return look
-
-
 def make_scene(seed, duration=2.0, vehicles=6, rgb_hz=20.0, evt_hz=100.0, jitter=0.0, clutter=0.5, miss=0.15):
     """Batches [(t, [(sensor, boxes, scores), …]), …] of vehicles in the picture, with clutter and misses."""
     rng = np.random.default_rng(seed)

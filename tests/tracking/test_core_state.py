@@ -1,4 +1,4 @@
-"""The state of the core's tracker: to a file and back, to an earlier moment and back; what is damaged is refused."""
+"""The state of the core's tracker: to a file and back, to an earlier moment; what is damaged is refused."""
 
 from __future__ import annotations
 
@@ -7,21 +7,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph import LiveTracker, Tracker, load_config
+from jeat_graph import Tracker, load_config
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.packing import pack, unpack
 from jeat_graph.io.state_file import read_state_file, write_state_file
+from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.checkpoint import _codecs, save_state
 from jeat_graph.tracking.model_tracker import ModelTracker
 
 _SIZE = (1280, 720)
-_SMOOTHERS = {"none": ["smoother.engine=none"], "lag": ["smoother.lag_s=.4"], "whole": ["smoother.engine=rts"]}
+_PICTURE = ["image.width=1280", "image.height=720", "input.picture=given"]
+_SMOOTHERS = {
+    "none": ["smoother.engine=none"],
+    "lag": ["smoother.lag_s=.4"],
+    "whole": ["smoother.engine=rts"],
+}
 
 
 def traffic(seed=0, times=60, classes=False, embeddings=False):
     """Scans of a camera and an event camera, which begins to look later; objects come and go."""
     rng = np.random.default_rng(seed)
-    place, speed = rng.uniform(0, 600, (12, 2)), rng.normal(0, 90, (12, 2))
+    place, speed = rng.uniform(200, 500, (12, 2)), rng.normal(0, 60, (12, 2))
     looks = rng.normal(size=(12, 8))
     for k in range(times):
         t = 0.05 * k
@@ -32,7 +38,9 @@ def traffic(seed=0, times=60, classes=False, embeddings=False):
             seen = there[rng.random(len(there)) < 0.9]
             corner = (place + speed * t)[seen] + rng.normal(0, 1.0, (len(seen), 2))
             stray = rng.uniform(0, 600, (rng.poisson(0.5), 2))
-            boxes = np.concatenate([np.concatenate([corner, stray]), np.full((len(seen) + len(stray), 2), 40.0)], axis=1)
+            boxes = np.concatenate(
+                [np.concatenate([corner, stray]), np.full((len(seen) + len(stray), 2), 40.0)], axis=1
+            )
             more = []
             if classes or embeddings:
                 more.append([("car", "van", "bus")[n % 3] for n in seen] + [""] * len(stray))
@@ -44,7 +52,16 @@ def traffic(seed=0, times=60, classes=False, embeddings=False):
 
 def bytes_of(table):
     """All columns of a table as bytes."""
-    columns = (table.t, table.track_id, table.boxes, table.existence, table.mean, table.var, table.used, table.size_var)
+    columns = (
+        table.t,
+        table.track_id,
+        table.boxes,
+        table.existence,
+        table.mean,
+        table.var,
+        table.used,
+        table.size_var,
+    )
     classes = () if table.classes is None else (table.classes.tolist(), table.class_probability.tobytes())
     return (*(column.tobytes() for column in columns), *classes)
 
@@ -83,7 +100,12 @@ def test_a_tracker_that_is_loaded_goes_on_with_the_same_bytes(smoother, cut, tmp
 
 
 @settings(max_examples=30)
-@given(seed=st.integers(0, 10**6), cut=st.integers(0, 30), back=st.integers(0, 20), smoother=st.sampled_from([*_SMOOTHERS]))
+@given(
+    seed=st.integers(0, 10**6),
+    cut=st.integers(0, 30),
+    back=st.integers(0, 20),
+    smoother=st.sampled_from([*_SMOOTHERS]),
+)
 def test_a_tracker_that_goes_back_is_where_it_was(seed, cut, back, smoother):
     scans = list(traffic(seed, 40))
     straight, tracker = tracker_with(smoother), tracker_with(smoother)
@@ -111,13 +133,13 @@ def _as_scan(scan):
 
 
 def test_the_reference_goes_back_too_and_says_that_it_is_not_saved(tmp_path):
-    scans = list(traffic(times=12))
+    scans = list(traffic(times=20))
     straight, tracker = (Tracker("core", engine="reference", image=_SIZE) for _ in range(2))
     for scan in scans[:6]:
         straight.step(scan)
         tracker.step(scan)
     moment = tracker.snapshot()
-    tracker.take_in([_as_scan(scans[8])])
+    tracker.take_in([_as_scan(scans[7])])
     tracker.restore(moment)
     for scan in scans[6:]:
         straight.step(scan)
@@ -130,7 +152,7 @@ def test_the_reference_goes_back_too_and_says_that_it_is_not_saved(tmp_path):
 
 def test_steps_are_handed_over_once_and_in_order():
     tracker = tracker_with("lag")
-    taken = [tracker.take_in([_as_scan(scan)]) for scan in list(traffic(times=12))]
+    taken = [tracker.take_in([_as_scan(scan)]) for scan in traffic(times=20)]
     tracker.hand_over(taken[6])
     with pytest.raises(ValueError, match="in order of time"):
         tracker.hand_over(taken[0])
@@ -174,6 +196,15 @@ def saved(tmp_path, smoother="lag", **more):
     return tracker, path
 
 
+def refusal(path):
+    """What is said of a file that is refused; None of one that is not."""
+    try:
+        Tracker.load(path)
+    except JeatGraphError as error:
+        return str(error)
+    return None
+
+
 def test_a_file_of_which_any_byte_was_changed_is_refused_in_one_line(tmp_path):
     _, path = saved(tmp_path)
     content, rng = path.read_bytes(), np.random.default_rng(1)
@@ -181,11 +212,8 @@ def test_a_file_of_which_any_byte_was_changed_is_refused_in_one_line(tmp_path):
         broken = bytearray(content)
         broken[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(broken)
-        try:
-            Tracker.load(path)
-        except JeatGraphError as error:
-            assert str(path) in str(error)
-            assert "\n" not in str(error)
+        said = refusal(path)
+        assert said is None or (str(path) in said and "\n" not in said)
     for length in rng.integers(0, len(content), 40).tolist():
         path.write_bytes(content[:length])
         with pytest.raises(JeatGraphError):
@@ -228,12 +256,12 @@ def test_a_state_with_any_wrong_array_is_refused_or_harms_nobody(tmp_path, smoot
         state["model"] = dict(state["model"])
         drawn_damage(rng, state["model"])
         save_state(path, tracker.config, state)
-        try:
-            loaded = Tracker.load(path)
-        except DataError as error:
+        said = refusal(path)
+        if said is not None:
             refused += 1
-            assert str(path) in str(error)
+            assert str(path) in said
             continue
+        loaded = Tracker.load(path)
         # What could be goes on, whatever comes of it.
         try:
             for scan in traffic(5, 3):
@@ -273,7 +301,7 @@ def test_what_no_tracker_has_beside_its_model_is_refused(tmp_path, part, value):
 def test_a_file_of_other_settings_or_of_another_version_is_refused(tmp_path):
     _, path = saved(tmp_path)
     with pytest.raises(JeatGraphError, match="lag_s"):
-        Tracker.load(path, load_config("core", ["smoother.lag_s=2"]))
+        Tracker.load(path, load_config("core", ["smoother.lag_s=2", *_PICTURE]))
     text, block = read_state_file(path, "state")
     write_state_file(path, text.replace(b'"format": ', b'"format": 9'), block)
     with pytest.raises(JeatGraphError, match="begin anew"):

@@ -2,84 +2,118 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.tracking.paper.kalman import noise_of
 from jeat_graph.tracking.paper.state import Found, Tracks
 
+_HAIR = 1.000001
 
-def distances(tracks: Tracks, found: Found) -> FloatArray:
-    """Return the squared Mahalanobis distances d² (N, M) of tracks and detections (paper eq. 5).
 
-    d² = yᵀ S⁻¹ y with y = z − H x and S = H P Hᵀ + R; S is a multiple of the unit matrix here.
+class Pairs(NamedTuple):
+    """P pairs of a track and a detection inside the gate, in ascending order of both.
+
+    Attributes:
+        row: (P,) tracks.
+        detection: (P,) detections.
+        d2: (P,) squared Mahalanobis distances.
     """
-    at, z = tracks.mean[:, :, 0], found.z
-    S = tracks.scale[:, found.sensor] * found.noise + tracks.cov[:, 0, 0][:, None]
-    dx, dy = at[:, :1] - z[:, 0], at[:, 1:] - z[:, 1]
-    return np.asarray((dx * dx + dy * dy) / S)
+
+    row: IntArray
+    detection: IntArray
+    d2: FloatArray
+
+    def take(self, which: BoolArray) -> Pairs:
+        """Return some of the pairs."""
+        return Pairs(*(column[which] for column in self))
 
 
-def match(d2: FloatArray, gate: float) -> tuple[IntArray, IntArray]:
-    """Solve the assignment of least cost, entries beyond the gate being +∞ (paper section D).
+def gated_pairs(tracks: Tracks, found: Found, gate: float) -> Pairs:
+    """List the pairs whose squared Mahalanobis distance is inside the gate (paper eq. 5).
+
+    d² = yᵀ S⁻¹ y with y = z − H x and S = H P Hᵀ + R; S is a multiple of the unit matrix here. Detections are
+    sorted by x, so that of each track only those within its gate's width are looked at.
+
+    Args:
+        tracks: N tracks, predicted to the time of the detections.
+        found: M detections.
+        gate: χ² bound on d².
+    """
+    n, at = len(tracks), tracks.mean[:, :, 0]
+    order = np.argsort(found.z[:, 0], kind="stable")
+    x = found.z[order, 0]
+    position_var = tracks.cov[:, 0, 0]
+    widest = position_var + tracks.scale.max(axis=1, initial=0.0) * found.noise.max(initial=0.0)
+    half = _HAIR * np.sqrt(gate * widest)  # a hair wider, so that rounding never decides here
+    first = np.searchsorted(x, at[:, 0] - half)
+    count = np.searchsorted(x, at[:, 0] + half, side="right") - first
+    row = np.repeat(np.arange(n), count)
+    detection = order[np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)]
+    y = found.z[detection] - at[row]
+    S = position_var[row] + noise_of(tracks, row, found, detection)
+    d2 = (y * y).sum(axis=1) / S
+    inside = np.flatnonzero(d2 <= gate)
+    inside = inside[np.lexsort((detection[inside], row[inside]))]
+    return Pairs(row[inside], detection[inside], d2[inside])
+
+
+def match(pairs: Pairs, gate: float) -> tuple[IntArray, IntArray]:
+    """Solve the assignment of least cost, all pairs but those inside the gate being +∞ (paper section D).
 
     As many pairs as possible are made, and of these the cheapest. A pair of a track and a detection that
     have nobody else inside the gate is made at once; the Hungarian algorithm solves for what is left.
 
     Args:
-        d2: (N, M) costs.
-        gate: χ² bound.
+        pairs: those inside the gate.
+        gate: its χ² bound.
 
     Returns:
-        (K,) rows, ascending, and (K,) columns.
+        (K,) tracks, ascending, and (K,) the detection of each.
     """
-    inside = d2 <= gate
-    rows, columns = np.nonzero(inside)
-    of_row, of_column = inside.sum(axis=1), inside.sum(axis=0)
-    alone = (of_row[rows] == 1) & (of_column[columns] == 1)
-    contested = ~alone
-    if contested.any():
-        some, others = np.unique(rows[contested]), np.unique(columns[contested])
-        sub = np.ix_(some, others)
-        never = (min(len(some), len(others)) + 1) * max(gate, 1.0)  # more than all pairs together
-        i, j = linear_sum_assignment(np.where(inside[sub], d2[sub], never))
-        made = inside[sub][i, j]
-        rows = np.concatenate([rows[alone], some[i[made]]])
-        columns = np.concatenate([columns[alone], others[j[made]]])
-        order = np.argsort(rows)
-        rows, columns = rows[order], columns[order]
-    return rows, columns
+    row, detection, d2 = pairs
+    alone = (np.bincount(row)[row] == 1) & (np.bincount(detection)[detection] == 1)
+    if alone.all():
+        return row, detection
+    rows, i = np.unique(row[~alone], return_inverse=True)
+    columns, j = np.unique(detection[~alone], return_inverse=True)
+    never = (min(len(rows), len(columns)) + 1) * max(gate, 1.0)  # more than all pairs together
+    cost = np.full((len(rows), len(columns)), never)
+    cost[i, j] = d2[~alone]
+    i, j = linear_sum_assignment(cost)
+    made = cost[i, j] < never
+    row = np.concatenate([row[alone], rows[i[made]]])
+    order = np.argsort(row)
+    return row[order], np.concatenate([detection[alone], columns[j[made]]])[order]
 
 
-def second_views(d2: FloatArray, gate: float, free: BoolArray) -> tuple[IntArray, IntArray]:
-    """Give each track, in order, the nearest detection inside the gate that is still free (algorithm 1).
+def second_views(pairs: Pairs) -> tuple[IntArray, IntArray]:
+    """Give each track, in order, the nearest of the detections that are still free (algorithm 1).
 
     The loop is over conflicts: all tracks before the first whose choice somebody before it has made, too,
     are served at once.
 
     Args:
-        d2: (N, M) distances to the tracks as the first detection has updated them.
-        gate: χ² bound.
-        free: (M,) whether nobody has taken the detection.
+        pairs: of matched tracks and free detections of another sensor, inside the gate; the distances are
+            those to the tracks as the first detection has updated them.
 
     Returns:
-        (K,) rows and (K,) columns.
+        (K,) tracks and (K,) the detection of each.
     """
-    open_to = np.where(free & (d2 <= gate), d2, np.inf)
-    rows: list[IntArray] = []
-    columns: list[IntArray] = []
-    waiting = np.flatnonzero(np.isfinite(open_to).any(axis=1))
-    while len(waiting):
-        costs = open_to[waiting]
-        waiting, costs = waiting[np.isfinite(costs).any(axis=1)], costs[np.isfinite(costs).any(axis=1)]
-        choice = costs.argmin(axis=1) if len(waiting) else np.zeros(0, dtype=np.int64)
-        first = np.unique(choice, return_index=True)[1]
-        repeated = np.setdiff1d(np.arange(len(choice)), first)
-        count = int(repeated[0]) if len(repeated) else len(choice)
-        rows.append(waiting[:count])
-        columns.append(choice[:count])
-        open_to[:, choice[:count]] = np.inf
-        waiting = waiting[count:]
-    if not rows:
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    return np.concatenate(rows), np.concatenate(columns)
+    served: list[Pairs] = []
+    while len(pairs.row):
+        # The nearest of each track, and who asks for it first.
+        pairs = Pairs(*(column[np.lexsort((pairs.d2, pairs.row))] for column in pairs))
+        nearest = np.unique(pairs.row, return_index=True)[1]
+        choice = pairs.detection[nearest]
+        again = np.setdiff1d(np.arange(len(choice)), np.unique(choice, return_index=True)[1])
+        count = int(again[0]) if len(again) else len(choice)
+        served.append(Pairs(*(column[nearest[:count]] for column in pairs)))
+        waiting = pairs.row > served[-1].row[-1]
+        pairs = pairs.take(waiting & ~np.isin(pairs.detection, choice[:count]))
+    if not served:
+        return pairs.row, pairs.detection
+    return np.concatenate([part.row for part in served]), np.concatenate([part.detection for part in served])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,7 +15,7 @@ from jeat_graph.smoothers.fixed_lag import FixedLagChain
 from jeat_graph.smoothers.gtsam.full import solve_track
 from jeat_graph.smoothers.gtsam.linear_graph import load_gtsam
 from jeat_graph.smoothers.gtsam.window import GtsamError
-from jeat_graph.smoothers.segments import smoothed_by
+from jeat_graph.smoothers.segments import Given, smoothed_by
 from jeat_graph.tracking.paper.segmenting import Piece
 
 if TYPE_CHECKING:
@@ -83,14 +84,13 @@ class TrackPath:
         first_step: number of the step at which the open segment begins.
         reference: (2, 3) what the state there is counted from inside GTSAM.
         open_from: time of its first state that is not final (s).
-        called: class and its share, as far as known.
+        pieces: the segments.
         fallbacks: how often our own pass stood in for GTSAM.
     """
 
     def __init__(self, engine: PathEngine, given: int, number: int, taken: StepTaken, row: int) -> None:
         self.identity, self.given = int(taken.ids[row]), given
         self.first_step, self.open_from = number, taken.t
-        self.called = "", float("nan")
         self.fallbacks = 0
         self._engine = engine
         self._prior = taken.tracks.mean[row], taken.tracks.cov[row]
@@ -98,10 +98,10 @@ class TrackPath:
         t = np.array([taken.t])
         self._birth = Rows(t, birth.used, birth.mean, birth.cov, birth.size_mean, birth.size_cov)
         self.reference: FloatArray = taken.tracks.mean[row]
-        self._pieces: list[Piece] = []
+        self.pieces: list[Piece] = []
         self._left = 0  # segments that are final
         self._chain: FixedLagChain | None = None
-        self._told = 0  # segments of `_pieces` that GTSAM's window has had
+        self._told = 0  # segments of `pieces` that GTSAM's window has had
         self._gtsam = engine.gtsam
 
     def add(self, piece: Piece, number: int) -> None:
@@ -110,87 +110,93 @@ class TrackPath:
             return
         self.first_step = number
         self.reference = piece.motion.mean[-1]
-        self._pieces.append(piece)
+        self.pieces.append(piece)
 
-    def departed(self, until: float, last_seen: float) -> list[Rows]:
-        """Return the rows that are final: of segments before a time, and before its last detection (s)."""
-        if self._engine.lagged and self._gtsam:
-            self._tell()
-        bound = min(until, last_seen)
-        count = sum(piece.t[-1] <= bound for piece in self._pieces)
-        if not count:
-            return []
-        rows = self._solved(count)
+    @property
+    def number(self) -> int:
+        """How many segments are not final."""
+        return len(self.pieces)
+
+    def before(self, t: float) -> int:
+        """Return how many of the segments end before a time or at it (s)."""
+        return sum(bool(piece.t[-1] <= t) for piece in self.pieces)
+
+    def leave(self, count: int) -> None:
+        """Forget the first segments, which are final now."""
         if self._chain is not None:
             self._chain.leave(count)
-        del self._pieces[:count]
+        self.open_from = float(self.pieces[count - 1].t[-1])
+        del self.pieces[:count]
         self._told -= count
         self._left += count
-        self.open_from = float(self._pieces[0].t[0]) if self._pieces else bound
-        return rows
 
-    def remaining(self, last_seen: float) -> list[Rows]:
-        """Return the rows of all segments that are not final, up to a time (s)."""
-        if self._engine.lagged and self._gtsam:
-            self._tell()
-        if not self._pieces:
-            return [] if self._left else [self._birth]
-        rows = self._solved(len(self._pieces), with_last=True)
-        out = []
-        for part in rows:
-            here = part.t <= last_seen
-            out.append(Rows(*(column[here] for column in part)))
-        return out
+    def alone(self) -> Rows | None:
+        """Return the only state of a track that has lived through one step, else None."""
+        return None if self.pieces or self._left else self._birth
 
-    def _tell(self) -> None:
-        """Give GTSAM's window the segments that it has not had."""
-        try:
-            if self._chain is None:
-                self._chain = FixedLagChain(*self._prior)
-            for piece in self._pieces[self._told :]:
-                if piece.rows is not None:
-                    self._chain.append(piece.rows, piece.motion.mean[-1])
-                self._told += 1
-        except GtsamError:
-            self._give_up()
-
-    def _give_up(self) -> None:
-        """Go on without GTSAM: our own pass knows as much."""
-        self._chain, self._gtsam = None, False
-        self.fallbacks += 1
-
-    def _ends(self) -> FloatArray | None:
+    def solved_ends(self) -> FloatArray | None:
         """Return GTSAM's means (B, 2, 3) of the last states of the segments, or None without it."""
-        if not self._gtsam or not self._pieces:
+        if not self._gtsam or not self.pieces:
             return None
         try:
-            if self._chain is not None:
-                return self._chain.means(range(self._left + 1, self._left + 1 + len(self._pieces)))
-            rows = [piece.rows for piece in self._pieces if piece.rows is not None]
-            reference = np.stack([self._prior[0], *(piece.motion.mean[-1] for piece in self._pieces)])
+            if self._engine.lagged:
+                chain = self._told_chain()
+                return chain.means(range(self._left + 1, self._left + 1 + len(self.pieces)))
+            rows = [piece.rows for piece in self.pieces if piece.rows is not None]
+            reference = np.stack([self._prior[0], *(piece.motion.mean[-1] for piece in self.pieces)])
             return solve_track(self._prior[1], rows, reference)[1:]
         except GtsamError:
-            self._give_up()
+            # Our own pass knows as much.
+            self._chain, self._gtsam = None, False
+            self.fallbacks += 1
             return None
 
-    def _solved(self, count: int, with_last: bool = False) -> list[Rows]:
-        """Return the states of the first `count` segments given all, each without its last one or with it."""
-        solved = self._ends()
-        out: list[Rows] = []
-        later: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
-        for k in range(len(self._pieces) - 1, -1, -1):
-            piece = self._pieces[k]
-            end, size_end = piece.motion.mean[-1], piece.size.mean[-1]
-            now = later or (end, piece.cov, size_end, piece.size_cov)
-            if solved is not None:
-                now = (solved[k], *now[1:])
-            whole = k < count
-            part = slice(None) if whole else slice(0, 1)
-            mean, cov = smoothed_by(piece.motion._make(a[part] for a in piece.motion), end, *now[:2])
-            size, size_cov = smoothed_by(piece.size._make(a[part] for a in piece.size), size_end, *now[2:])
-            later = mean[0], cov[0], size[0], size_cov[0]
-            if whole:
-                stop = len(piece.t) if with_last and k == len(self._pieces) - 1 else -1
-                columns = (piece.t, piece.used, mean, cov, size, size_cov)
-                out.append(Rows(*(column[:stop] for column in columns)))
-        return out[::-1]
+    def _told_chain(self) -> FixedLagChain:
+        """Return GTSAM's window with all segments in it."""
+        if self._chain is None:
+            self._chain = FixedLagChain(*self._prior)
+        for piece in self.pieces[self._told :]:
+            if piece.rows is not None:
+                self._chain.append(piece.rows, piece.motion.mean[-1])
+            self._told += 1
+        return self._chain
+
+
+def solve(paths: Sequence[TrackPath], counts: Sequence[int], whole: bool = False) -> list[list[Rows]]:
+    """Return the states of tracks given all that they have been told: each segment's, without its last one.
+
+    The pass back goes over all tracks at once, from segment to segment.
+
+    Args:
+        paths: n tracks.
+        counts: of each, how many of its first segments are wanted.
+        whole: whether the last state of all is wanted, too.
+    """
+    out: list[list[Rows]] = [[] for _ in paths]
+    order = sorted(range(len(paths)), key=lambda i: -paths[i].number)
+    solved = [paths[i].solved_ends() for i in order]
+    state: list[FloatArray] = []
+    for j in range(max((path.number for path in paths), default=0)):
+        active = [i for i in order if paths[i].number > j]
+        pieces = [paths[i].pieces[-1 - j] for i in active]
+        ends = [np.stack([piece.motion.mean[-1] for piece in pieces]), None]
+        ends[1] = np.stack([piece.size.mean[-1] for piece in pieces])
+        if j == 0:
+            state = [ends[0].copy(), np.stack([p.cov for p in pieces]), ends[1], np.stack([p.size_cov for p in pieces])]
+        mean, cov, size_mean, size_cov = (one[: len(active)] for one in state)
+        for n, known in enumerate(solved[: len(active)]):
+            if known is not None:
+                mean[n] = known[-1 - j]
+        for n, (i, piece) in enumerate(zip(active, pieces, strict=True)):
+            if paths[i].number - 1 - j < counts[i]:
+                motion = smoothed_by(piece.motion, piece.motion.mean[-1], mean[n], cov[n])
+                size = smoothed_by(piece.size, piece.size.mean[-1], size_mean[n], size_cov[n])
+                stop = len(piece.t) if whole and j == 0 else -1
+                out[i].append(Rows(*(one[:stop] for one in (piece.t, piece.used, *motion, *size))))
+        first = Given(*(np.stack(part) for part in zip(*((a[0] for a in p.motion) for p in pieces), strict=True)))
+        first_size = Given(*(np.stack(part) for part in zip(*((a[0] for a in p.size) for p in pieces), strict=True)))
+        state = [
+            *smoothed_by(first, ends[0], mean, cov),
+            *smoothed_by(first_size, ends[1], size_mean, size_cov),
+        ]
+    return [rows[::-1] for rows in out]

@@ -16,7 +16,7 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.tracking.paper.path import PathEngine, Rows, TrackPath
+from jeat_graph.tracking.paper.path import PathEngine, Rows, TrackPath, solve
 from jeat_graph.tracking.paper.segmenting import cut_segments
 from jeat_graph.tracking.paper.state import Tracks, sizes_of
 from jeat_graph.tracking.paper.table import boxes_at
@@ -101,11 +101,7 @@ class PaperSmoothers:
             self._paths[identity] = TrackPath(self._engine, int(given[row]), number, taken, row)
         due = taken.ids[(taken.ids + number) % STRIDE == 0].tolist()
         self._cut(due, number)
-        rows = np.searchsorted(taken.ids, due)
-        for identity, row, confirmed in zip(due, rows, taken.tracks.confirmed[rows], strict=True):
-            if confirmed:
-                path = self._paths[identity]
-                self._keep(path, path.departed(taken.t - self._lag_s, float(taken.tracks.t_update[row])))
+        self._depart(taken, due)
         if number % STRIDE == 0:
             self._forget_steps()
 
@@ -124,10 +120,7 @@ class PaperSmoothers:
             newest = self._steps[-1]
             number = self._first + len(self._steps) - 1
             self._cut(self._living.tolist(), number)
-            for identity, row in zip(newest.ids.tolist(), range(len(newest.ids)), strict=True):
-                if newest.tracks.confirmed[row]:
-                    path = self._paths[identity]
-                    parts += self._tables(path, path.remaining(float(newest.tracks.t_update[row])))
+            parts += self._remaining(newest.ids[newest.tracks.confirmed].tolist())
         return _in_order(Trajectories.concatenate(parts))
 
     def finish(self, sensors: tuple[str, ...]) -> Trajectories:
@@ -142,14 +135,11 @@ class PaperSmoothers:
         if not ended:
             return
         last = self._steps[-1]
-        row = dict(zip(ended, np.searchsorted(last.ids, ended).tolist(), strict=True))
-        confirmed = [identity for identity in ended if last.tracks.confirmed[row[identity]]]
+        confirmed = last.ids[last.tracks.confirmed & np.isin(last.ids, ended)].tolist()
         self._cut(confirmed, self._first + len(self._steps) - 1)
-        for identity in confirmed:
-            path = self._paths[identity]
-            self._keep(path, path.remaining(float(last.tracks.t_update[row[identity]])))
-            self._fallbacks += path.fallbacks
-            self._smoothed += 1
+        self._final += self._remaining(confirmed)
+        self._fallbacks += sum(self._paths[identity].fallbacks for identity in confirmed)
+        self._smoothed += len(confirmed)
         for identity in ended:
             del self._paths[identity]
 
@@ -178,40 +168,64 @@ class PaperSmoothers:
             oldest = min((path.open_from for path in self._paths.values()), default=math.inf)
             self._wanted = [t for t in self._wanted if t >= oldest]
 
-    def _keep(self, path: TrackPath, rows: list[Rows]) -> None:
-        self._final += self._tables(path, rows)
+    def _depart(self, taken: StepTaken, due: list[int]) -> None:
+        """Let segments of some living tracks become final: those behind the lag, and before a last detection."""
+        at = np.searchsorted(taken.ids, due)
+        at = at[taken.tracks.confirmed[at]]
+        until = np.minimum(taken.tracks.t_update[at], taken.t - self._lag_s)
+        paths = [self._paths[identity] for identity in taken.ids[at].tolist()]
+        counts = [path.before(t) for path, t in zip(paths, until.tolist(), strict=True)]
+        ready = [(path, count) for path, count in zip(paths, counts, strict=True) if count]
+        if not ready:
+            return
+        paths, counts = [path for path, _ in ready], [count for _, count in ready]
+        rows = solve(paths, counts)
+        for path, count in ready:
+            path.leave(count)
+        self._final += self._tables(paths, rows)
 
-    def _tables(self, path: TrackPath, rows: list[Rows]) -> list[Trajectories]:
-        """Turn smoothed states into rows of a table."""
-        tables = [self._table(path, part) for part in rows if len(part.t)]
-        return [table for table in tables if len(table)]
-
-    def _table(self, path: TrackPath, rows: Rows) -> Trajectories:
-        n, size = len(rows.t), sizes_of(rows.size_mean)
-        boxes, shown = boxes_at(rows.mean[:, :, 0], size, self._config)
-        classes, probability = None, None
+    def _remaining(self, identities: list[int]) -> list[Trajectories]:
+        """Return all rows that are not final of tracks of the newest step, up to each one's last detection."""
+        if not identities:
+            return []
         newest = self._steps[-1]
-        if newest.classes is not None and newest.class_probability is not None:
-            at = int(np.searchsorted(newest.ids, path.identity))
-            if at < len(newest.ids) and newest.ids[at] == path.identity:
-                path.called = str(newest.classes[at]), float(newest.class_probability[at])
-            classes, probability = np.full(n, path.called[0]), np.full(n, path.called[1])
+        paths = [self._paths[identity] for identity in identities]
+        last_seen = newest.tracks.t_update[np.searchsorted(newest.ids, identities)].tolist()
+        rows = solve(paths, [path.number for path in paths], whole=True)
+        seen = []
+        for path, t, parts in zip(paths, last_seen, rows, strict=True):
+            alone = path.alone()
+            kept = parts if alone is None else [alone]
+            seen.append([Rows(*(column[part.t <= t] for column in part)) for part in kept])
+        return self._tables(paths, seen)
+
+    def _tables(self, paths: list[TrackPath], rows: list[list[Rows]]) -> list[Trajectories]:
+        """Turn smoothed states of tracks of the newest step into a table, if there are any."""
+        parts = [part for track in rows for part in track]
+        if not parts:
+            return []
+        newest = self._steps[-1]
+        lengths = [sum(len(part.t) for part in track) for track in rows]
+        row = np.repeat(np.searchsorted(newest.ids, [path.identity for path in paths]), lengths)
+        t, used, mean, cov, size_mean, size_cov = (np.concatenate(one) for one in zip(*parts, strict=True))
+        size = sizes_of(size_mean)
+        boxes, shown = boxes_at(mean[:, :, 0], size, self._config)
         table = Trajectories(
-            t=rows.t,
-            track_id=np.full(n, path.given, dtype=np.int64),
+            t=t,
+            track_id=np.repeat(np.array([path.given for path in paths], dtype=np.int64), lengths),
             boxes=boxes,
-            existence=np.ones(n),
-            mean=rows.mean.transpose(0, 2, 1).reshape(-1, 6),
-            var=np.repeat(np.diagonal(rows.cov, axis1=1, axis2=2), 2, axis=1),
-            used=rows.used,
+            existence=np.ones(len(t)),
+            mean=mean.transpose(0, 2, 1).reshape(-1, 6),
+            var=np.repeat(np.diagonal(cov, axis1=1, axis2=2), 2, axis=1),
+            used=used,
             sensors=newest.sensors,
-            classes=classes,
-            class_probability=probability,
-            size_var=size * size * rows.size_cov[:, :1, 0],
+            classes=None if newest.classes is None else newest.classes[row],
+            class_probability=None if newest.class_probability is None else newest.class_probability[row],
+            size_var=size * size * size_cov[:, :1, 0],
         )
         if self._rate_hz > 0.0:
-            shown &= np.isin(rows.t, self._wanted)
-        return table if shown.all() else table.take(shown)
+            shown &= np.isin(t, self._wanted)
+        return [table if shown.all() else table.take(shown)]
 
     def _note_wanted(self, t: float) -> None:
         """Note whether the table has rows at a step: at the first in each interval of the output's rate."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.config.paper import PaperConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.tracking.paper.association import distances, match, second_views
+from jeat_graph.tracking.paper.association import gated_pairs, match, second_views
 from jeat_graph.tracking.paper.kalman import born, noise_of, predict, update
 from jeat_graph.tracking.paper.state import Found, Tracks
 
@@ -60,16 +60,15 @@ def step(tracks: Tracks, t: float, dt: float, found: Found, first_id: int, confi
         return update(tracks, row, found, detection, t, config)
 
     if len(tracks) and len(found):
-        row, detection = match(distances(tracks, found), config.gate)
+        row, detection = match(gated_pairs(tracks, found, config.gate), config.gate)
         first = np.full(len(tracks), -1)
         first[row] = found.sensor[detection]
         tracks = take(row, detection)
         for sensor in np.unique(found.sensor[taker == 0]):
-            others = np.flatnonzero((first >= 0) & (first != sensor))
-            if len(others):
-                free = (taker == 0) & (found.sensor == sensor)
-                k, detection = second_views(distances(tracks.take(others), found), config.gate, free)
-                tracks = take(others[k], detection)
+            pairs = gated_pairs(tracks, found, config.gate)
+            free = (taker[pairs.detection] == 0) & (found.sensor[pairs.detection] == sensor)
+            other = (first[pairs.row] >= 0) & (first[pairs.row] != sensor)
+            tracks = take(*second_views(pairs.take(free & other)))
     z = weighed / np.where(information > 0.0, information, 1.0)[:, None]
     tracks = confirm(tracks, t, config)
     alive = lives(tracks, t, config)

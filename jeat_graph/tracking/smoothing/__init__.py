@@ -1,1 +1,0 @@
-"""Smoothing inside the tracker: what each track took in, its smoother, and the smoothed table."""

@@ -1,0 +1,177 @@
+"""The smoothed tables of the engine `paper`: what each engine of `smoother.engine` gives, and when."""
+
+import numpy as np
+import pytest
+
+from jeat_graph import Tracker, load_config
+from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.smoothers.gtsam.window import GtsamError, GtsamWindow
+
+
+def run(scene, engine, *settings, drain=None, **arguments):
+    """Track a scene; returns the tracker, its causal tables, the smoothed rows in the order they came."""
+    tracker = Tracker(load_config("paper", [f"smoother.engine={engine}", *settings]))
+    causal, rows = [], []
+    for k, (t, scans) in enumerate(scene(**arguments)):
+        causal.append(tracker.step([(t, *scan) for scan in scans]))
+        if drain and k % drain == 0:
+            rows.append(tracker.drain_smoothed())
+    rows.append(tracker.finish())
+    return tracker, Trajectories.concatenate(causal), Trajectories.concatenate(rows)
+
+
+def same(one, other, position=1e-6):
+    assert np.array_equal(one.t, other.t)
+    assert np.array_equal(one.track_id, other.track_id)
+    assert np.array_equal(one.used, other.used)
+    units = np.array([1, 1, 20, 20, 400, 400])
+    assert np.abs((one.mean - other.mean) / units).max() < position
+    assert np.allclose(one.var, other.var, rtol=1e-6)
+    assert np.allclose(one.size_var, other.size_var, rtol=1e-6)
+
+
+SCENE = {"seed": 3, "duration": 2.5, "vehicles": 8}
+
+
+@pytest.mark.parametrize("engine", ["rts", "full"])
+def test_a_lag_as_long_as_the_recording_is_the_whole_track(scene, engine):
+    _, _, whole = run(scene, engine, **SCENE)
+    for lagged in ("fixed-lag", "fixed-lag-rts"):
+        _, _, rows = run(scene, lagged, "smoother.lag_s=100", **SCENE)
+        same(rows, whole)
+
+
+def test_gtsam_with_a_lag_is_our_own_pass_with_that_lag(scene):
+    for lag in (0.01, 0.3, 1.0):
+        _, _, gtsam = run(scene, "fixed-lag", f"smoother.lag_s={lag}", **SCENE)
+        _, _, own = run(scene, "fixed-lag-rts", f"smoother.lag_s={lag}", **SCENE)
+        same(gtsam, own)
+
+
+def test_a_longer_lag_is_nearer_to_the_whole_track(scene):
+    _, _, whole = run(scene, "rts", **SCENE)
+    apart = []
+    for lag in (0.05, 0.3, 1.0):
+        _, _, rows = run(scene, "fixed-lag", f"smoother.lag_s={lag}", **SCENE)
+        apart.append(np.abs(rows.mean[:, :2] - whole.mean[:, :2]).mean())
+    assert apart[0] > 2 * apart[1] > 4 * apart[2]
+
+
+@pytest.mark.parametrize("engine", ["fixed-lag", "fixed-lag-rts", "full", "rts"])
+def test_a_track_has_a_row_at_each_step_from_its_first_to_its_last_detection(scene, engine):
+    _, causal, rows = run(scene, engine, **SCENE)
+    assert set(rows.track_id) == set(causal.track_id)
+    times = np.array([t for t, _ in scene(**SCENE)])
+    for identity in np.unique(rows.track_id):
+        mine = rows.take(rows.track_id == identity)
+        assert np.array_equal(mine.t, times[(times >= mine.t[0]) & (times <= mine.t[-1])])
+        assert mine.used[0] != 0
+        assert mine.used[-1] != 0
+        seen = causal.take((causal.track_id == identity) & (causal.used != 0))
+        assert mine.t[-1] == seen.t[-1]
+    assert (rows.existence == 1.0).all()
+
+
+def test_the_last_state_is_the_filters(scene):
+    _, causal, rows = run(scene, "full", **SCENE)
+    for identity in np.unique(rows.track_id):
+        last = rows.take(rows.track_id == identity).take([-1])
+        here = causal.take((causal.track_id == identity) & (causal.t == last.t[0]))
+        assert np.allclose(last.mean, here.mean, atol=1e-6)
+        assert np.allclose(last.var, here.var)
+        assert np.allclose(last.boxes, here.boxes, atol=1e-6)
+
+
+@pytest.mark.parametrize("engine", ["fixed-lag", "rts"])
+def test_what_is_drained_comes_in_order_of_time_and_is_all_there_is(scene, engine):
+    _, _, at_once = run(scene, engine, **SCENE)
+    _, _, parts = run(scene, engine, drain=7, **SCENE)
+    assert (np.diff(parts.t) >= 0).all()
+    same(parts, at_once, 1e-9)
+
+
+def test_with_a_lag_rows_come_while_the_tracks_live(scene):
+    tracker = Tracker(load_config("paper", ["smoother.engine=fixed-lag", "smoother.lag_s=0.3"]))
+    for t, scans in scene(**SCENE):
+        tracker.step([(t, *scan) for scan in scans])
+    rows = tracker.drain_smoothed()
+    assert rows.t.max() > 1.0
+    assert t - 0.3 >= rows.t.max()
+
+
+def test_all_so_far_is_what_the_end_would_give(scene):
+    tracker = Tracker(load_config("paper", ["smoother.engine=rts"]))
+    for t, scans in scene(**SCENE):
+        tracker.step([(t, *scan) for scan in scans])
+    same(tracker.smoothed(), tracker.finish(), 1e-9)
+    assert len(tracker.finish()) == 0
+    with pytest.raises(JeatGraphError, match="finished"):
+        tracker.step((99.0, "rgb", [], []))
+
+
+def test_scans_of_one_time_in_two_steps_share_a_state(scene):
+    tracker = Tracker(load_config("paper", ["smoother.engine=full"]))
+    own = Tracker(load_config("paper", ["smoother.engine=rts"]))
+    for t, scans in scene(**SCENE):
+        for scan in scans:
+            tracker.step((t, *scan))
+            own.step((t, *scan))
+    rows = tracker.finish()
+    for identity in np.unique(rows.track_id):
+        assert (np.diff(rows.t[rows.track_id == identity]) > 0).all()
+    same(rows, own.finish())
+
+
+def test_an_output_rate_keeps_the_first_row_of_each_interval(scene):
+    _, _, every = run(scene, "rts", **SCENE)
+    _, _, some = run(scene, "rts", "smoother.output_rate_hz=10", **SCENE)
+    times = np.array([t for t, _ in scene(**SCENE)])
+    wanted = times[np.unique(np.floor(times * 10 + 1e-9), return_index=True)[1]]
+    same(some, every.take(np.isin(every.t, wanted)), 1e-9)
+
+
+def test_where_gtsam_fails_our_own_pass_goes_on(scene, monkeypatch):
+    _, _, expected = run(scene, "fixed-lag-rts", **SCENE)
+    update, calls = GtsamWindow.update, []
+
+    def fails(window, *arguments):
+        calls.append(0)
+        if len(calls) % 10 == 0:
+            raise GtsamError("on purpose")
+        update(window, *arguments)
+
+    monkeypatch.setattr(GtsamWindow, "update", fails)
+    tracker, _, rows = run(scene, "fixed-lag", **SCENE)
+    same(rows, expected)
+    assert tracker.smoother_counts["fallbacks"] > 0
+
+
+def test_no_smoother_has_no_rows(scene):
+    tracker, _, rows = run(scene, "none", **SCENE)
+    assert len(rows) == 0
+    assert tracker.smoother_counts == {}
+    with pytest.raises(JeatGraphError, match="no smoother"):
+        tracker.smoothed()
+
+
+def test_identities_may_be_given_by_whoever_hands_steps_over(scene):
+    tracker = Tracker(load_config("paper", ["smoother.engine=rts"]))
+    for t, scans in scene(**SCENE):
+        taken = tracker.take_in(tracker_scans(t, scans))
+        tracker.hand_over(taken._replace(given=taken.ids + 100))
+    assert tracker.finish().track_id.min() > 100
+
+
+def tracker_scans(t, scans):
+    from jeat_graph.data.detections import Scan
+
+    return [Scan(t, name, boxes, scores) for name, boxes, scores in scans]
+
+
+def test_a_track_of_one_detection_has_its_row(scene):
+    settings = ["paper.confirm_age_s=0", "paper.confirm_hits=1", "smoother.engine=full"]
+    tracker = Tracker(load_config("paper", settings))
+    tracker.step((0.0, "rgb", [[10, 20, 30, 40]], [1.0]))
+    rows = tracker.finish()
+    assert rows.boxes.tolist() == [pytest.approx([10, 20, 30, 40])]
