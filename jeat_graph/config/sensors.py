@@ -44,9 +44,7 @@ class SensorConfig(Section):
         1.0,
         open_low=True,
     )
-    sigma_px: float = number(
-        3.0, "px", "engine `paper`: standard deviation of a box's centre", open_low=True
-    )
+    sigma_px: float = number(3.0, "px", "engine `paper`: standard deviation of a box's centre", open_low=True)
     sigma_log_size: float = number(
         0.1, "ln px", "engine `paper`: standard deviation of ln width and ln height", open_low=True
     )
