@@ -26,6 +26,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "generated_reference",
     "mathml",
+    "type_names",
 ]
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3

@@ -36,7 +36,7 @@ def track(
     Args:
         detections: the recording, a data frame that `Detections.from_pandas` takes, or a file that
             `read_detections` knows.
-        config: a configuration, the name of a preset, or a YAML file.
+        config: a configuration, the name of a preset (`default`, `paper`), or a YAML file.
         image: width and height of the picture (px), if not those of the configuration or of a file beside the
             recording (`seqinfo.ini`).
         classes: the detections to take, and those without a class; None takes all.
@@ -158,7 +158,7 @@ def compare(
 
     Args:
         detections: as for `track`.
-        config: a configuration, the name of a preset, or a YAML file.
+        config: a configuration, the name of a preset (`default`, `paper`), or a YAML file.
         truth: truth, a data frame or its file. Without motion in it positions alone are judged, by the
             centres of its boxes; without truth only consistency.
         lags_s: lags (s); 0 is the filter.

@@ -21,7 +21,8 @@ class Tracker(ModelTracker):
     Sensors may have any names and are known from their first scan on.
 
     Args:
-        config: sensors and settings, from `load_config`; or the name of a preset, or of a YAML file.
+        config: sensors and settings, from `load_config`; or the name of a preset (`default`, `paper`), or of
+            a YAML file.
         image: width and height of the picture (px), also as "1920x1080", if not those of the configuration.
         diagnostics: take down how well each detection fitted its track, for `last_updates`.
         engine: "core", "reference" or "paper", if not that of the configuration.
