@@ -16,6 +16,8 @@
 #   make sanitize   run the tests of what is compiled with AddressSanitizer and UndefinedBehaviorSanitizer
 #   make marches   compare what the core computes when built for the oldest processors and for this one
 #   make build   build the wheels (in dist/)
+#   make reproducible   build the last commit twice, wheels and sources: the same bytes (in build/reproducible/first)
+#   make sbom    write the list of what the wheel needs and holds (CycloneDX, in dist/)
 #   make docs    build the documentation (in docs/_build/html)
 #   make clean   remove what was built and computed, .venv included
 
@@ -31,6 +33,8 @@ export PYTHONDONTWRITEBYTECODE :=
 # The build without what GPUs need, which takes gigabytes. Where pip does not find it by itself, give PIP_EXTRA_INDEX_URL
 # the address of PyTorch's index for processors.
 TORCH := torch==2.13.0+cpu
+# The time of all files in wheels: that of the last commit, so that a later build gives the same bytes.
+export SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2> /dev/null || date +%s)
 CORE := $(shell find jeat_graph/core -name '*.?pp' -o -name CMakeLists.txt)
 SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.py')
 # What is no part of the tracker's distribution: the simulator and training, and the benchmarks.
@@ -46,7 +50,7 @@ OTHER_KERNELS = OPENBLAS_CORETYPE=$(if $(filter x86_64 AMD64,$(shell uname -m)),
 DOCUMENTED := jeat_graph filters association smoothers eval configs sehn/jeat_graph_sehn benchmarks
 
 .PHONY: demo test test-slow test-all installed-for-tests test-portable benchmark licences live fuzz lint types bounds core \
-	sanitize marches build docs clean
+	sanitize marches build reproducible sbom docs clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.core $(VENV)/.sehn
@@ -89,7 +93,12 @@ lint: $(VENV)/.lint $(VENV)/.core $(VENV)/.sehn
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/interrogate --quiet $(DOCUMENTED) || $(BIN)/interrogate -v $(DOCUMENTED)
+	@$(BIN)/python .ci/prose.py
 	@$(BIN)/python .ci/audit.py
+	@$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	@$(BIN)/check-jsonschema --builtin-schema vendor.readthedocs .readthedocs.yaml
+	@$(BIN)/zizmor --offline --no-progress --quiet .github
+	@$(BIN)/shellcheck .ci/run .ci/bounds .ci/sanitize .ci/reproducible
 
 # The folders at the top of the repository become one package only when it is built, so that is what is checked;
 # the benchmarks, which are not, are looked at through a link.
@@ -114,6 +123,18 @@ marches: $(VENV)/.core
 	@PYTHON=$(BIN)/python .ci/marches
 
 build: build/.wheel
+
+reproducible: $(VENV)/.run
+	@$(PIP) 'build>=1.2,<2' 'hatchling>=1.27,<2'
+	@PYTHON=$(BIN)/python .ci/reproducible
+
+# In an environment of its own: what else is installed beside the wheel is no part of it.
+sbom: build/.wheel $(VENV)/.run
+	@$(PIP) 'cyclonedx-bom>=7,<8'
+	@$(PYTHON) -m venv --clear build/sbom
+	@build/sbom/bin/python -m pip install -qq --disable-pip-version-check --no-compile dist/jeat_graph-*.whl
+	@$(BIN)/python .ci/sbom.py build/sbom/bin/python \
+		"$$(ls dist/jeat_graph-*.whl | sed 's/-cp.*//').cdx.json"
 
 # A warning is an error: a link or a name that leads nowhere.
 docs: $(VENV)/.docs
@@ -174,7 +195,7 @@ $(VENV)/.lint: pyproject.toml | $(BIN)/python
 build/.wheel: $(SOURCES) $(CORE) $(BESIDE) $(shell find configs -type f -not -name '*.pyc') pyproject.toml sehn/pyproject.toml | $(BIN)/python
 	@echo "make: building the wheels"
 	@$(PIP) build
-	@rm -rf dist sehn/build
+	@rm -rf dist
 	@$(BIN)/python -m build --wheel --outdir dist . > $(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@$(BIN)/python -m build --wheel --outdir dist sehn > $(VENV)/build.log 2>&1 || { cat $(VENV)/build.log; exit 1; }
 	@mkdir -p build && touch $@

@@ -30,6 +30,16 @@ def wanted(package: str) -> set[str]:
     return {path.as_posix() for path in found if "__pycache__" not in path.parts}
 
 
+def licences(names: list[str]) -> list[str]:
+    """Say which licences the wheel lacks: ours, and those of what is compiled into its core."""
+    texts = [Path("LICENSE"), *sorted(Path("licenses").glob("*.txt"))]
+    return [
+        f"the licence {text} is missing from the wheel"
+        for text in texts
+        if not any(name.endswith(f".dist-info/licenses/{text.as_posix()}") for name in names)
+    ]
+
+
 def problems(wheel: Path) -> list[str]:
     """List what is wrong with a wheel, one line each."""
     package = wheel.name.split("-")[0]
@@ -43,6 +53,7 @@ def problems(wheel: Path) -> list[str]:
     ]
     if package == "jeat_graph":
         compiled = [name for name in names if name.startswith("jeat_graph/core/_core.")]
+        found += licences(names)
         if len(compiled) != 1:
             found.append(f"one compiled core belongs in the wheel, not {compiled}")
     return found + [f"{name} is missing from the wheel" for name in sorted(wanted(package) - set(names))]

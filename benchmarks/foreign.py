@@ -1,25 +1,15 @@
-"""Worlds that no preset was made for, and other trackers in them: streets and squares beside the highway.
-
-Each world is a scene of `foreign_scenes` with detectors of its own. `default` is given what they see, as it
-comes; the others, with their defaults, each detector alone and all merged, and the best of those counts.
-"""
+"""Worlds beside the highway: streets, squares, a crossing, a roundabout, each with detectors of its own."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.common import over_seeds
-from benchmarks.contenders import NAMES
 from benchmarks.foreign_routes import Route, crossing, roundabout, square, street
 from benchmarks.foreign_scenes import populate
-from benchmarks.judging import HEADLINE, spread, spread_text
-from benchmarks.real_ours import OursOnSet, judge_row
-from benchmarks.real_sets import RealSet
 from benchmarks.recordings import JudgedRecording
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
@@ -31,11 +21,6 @@ from jeat_graph_sehn.simulation.sensors.timing import TimingConfig, run_clock
 from jeat_graph_sehn.simulation.streams import stream
 from jeat_graph_sehn.simulation.world.camera import CameraConfig
 from jeat_graph_sehn.simulation.world.truth import TruthConfig, look
-
-if TYPE_CHECKING:
-    from jeat_graph.eval.tables import Cell, Table
-
-DEFAULT = "default"
 
 
 def _detector(
@@ -125,72 +110,12 @@ def recorded(name: str, seed: int, duration_s: float) -> JudgedRecording:
     assert truth is not None
     detections = Detections.concatenate(parts)
     return JudgedRecording(
-        f"{name}/{seed}", detections if world.change is None else world.change(detections), truth
+        f"{name}/{seed}",
+        detections if world.change is None else world.change(detections),
+        truth,
+        picture,
     )
 
 
 def _without_scores(detections: Detections) -> Detections:
     return replace(detections, scores=np.ones(len(detections)))
-
-
-class WorldJob(NamedTuple):
-    """One recording of one world.
-
-    Attributes:
-        name: of the world.
-        seed: of the recording.
-        duration_s: of the recording.
-        peers: other trackers, by their keys.
-    """
-
-    name: str
-    seed: int
-    duration_s: float
-    peers: tuple[str, ...]
-
-
-def judge_world(job: WorldJob) -> list[dict[str, Any]]:
-    """Judge `default` with all detectors, both tables, and the peers with their defaults on every stream."""
-    from benchmarks.baselines import judge_baseline
-
-    recording = recorded(job.name, job.seed, job.duration_s)
-    sensors = tuple(_world(job.name).sensors)
-    one = RealSet(job.name, sensors, (recording,))
-    row = judge_row(OursOnSet(DEFAULT, sensors), one)
-    found = [_record(job, DEFAULT, kind, row[kind]) for kind in ("causal", "smoothed")]
-    for stream_ in one.streams:
-        for name in job.peers:
-            scores = judge_baseline(name, [(recording.truth, recording.detections)], stream_).scores.as_dict()
-            found.append(_record(job, f"{NAMES[name]}, {' + '.join(stream_)}", "causal", scores))
-    return found
-
-
-def worlds_table(records: Sequence[Mapping[str, Any]], seeds: int) -> Table:
-    """One row a world: ours, and of each measure the best of the others."""
-    from jeat_graph.eval.tables import Table
-
-    out: list[dict[str, Cell]] = []
-    for world in dict.fromkeys(r["world"] for r in records):
-        here = [r for r in records if r["world"] == world]
-        cells: dict[str, Cell] = {"": world}
-        for kind in ("causal", "smoothed"):
-            mine = [r["scores"] for r in here if r["row"] == DEFAULT and r["kind"] == kind]
-            cells[f"default, {kind}"] = " / ".join(spread_text([s[m] for s in mine]) for m in HEADLINE)
-        others = dict.fromkeys(r["row"] for r in here if r["row"] != DEFAULT)
-        for m in HEADLINE if others else ():
-            by_row = {row: [r["scores"][m] for r in here if r["row"] == row] for row in others}
-            best = max(by_row, key=lambda row: spread(by_row[row])[0])
-            cells[f"most {m} of another"] = f"{spread_text(by_row[best])} ({best})"
-        out.append(cells)
-    title = f"Other worlds, simulated: {' / '.join(HEADLINE)}, {over_seeds(seeds)}"
-    return Table.from_records(out, list(out[0]), title=title)
-
-
-def _record(job: WorldJob, row: str, kind: str, scores: Mapping[str, float]) -> dict[str, Any]:
-    return {
-        "world": job.name,
-        "seed": job.seed,
-        "row": row,
-        "kind": kind,
-        "scores": {name: float(scores[name]) for name in (*HEADLINE, "FP", "FN", "IDSW")},
-    }

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import os
 import platform
+import shutil
+import subprocess
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import Any
 
 from jeat_graph.config.reading import config_to_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.version import __version__
 
-_PACKAGES = ("numpy", "scipy", "numba", "gtsam", "trackers", "norfair", "supervision")
+_PACKAGES = ("numpy", "scipy", "gtsam", "trackers", "norfair", "supervision")
+_ROOT = Path(__file__).resolve().parents[1]
+#: Folders that a benchmark imports from.
+_IMPORTED = ("jeat_graph", "filters", "association", "smoothers", "eval", "configs", "benchmarks", "sehn")
 
 
 def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> dict[str, Any]:
@@ -24,6 +30,7 @@ def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> di
     """
     return {
         "jeat_graph": __version__,
+        "commit": commit(),
         "packages": {name: _version(name) for name in _PACKAGES},
         "python": platform.python_version(),
         "machine": {
@@ -34,6 +41,20 @@ def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> di
         "settings": dict(settings),
         "configs": {name: config_to_dict(config) for name, config in configs.items()},
     }
+
+
+def commit() -> str:
+    """The commit of this checkout as text; says so where files that are imported differ from it."""
+    git = shutil.which("git")
+    if git is None or not (_ROOT / ".git").exists():
+        return "an unknown commit"
+
+    def ask(*words: str) -> str:
+        done = subprocess.run([git, "-C", str(_ROOT), *words], capture_output=True, text=True, check=False)
+        return done.stdout.strip()
+
+    changed = ask("status", "--porcelain", "--untracked-files=no", "--", *_IMPORTED)
+    return f"commit `{ask('rev-parse', '--short=12', 'HEAD')}`" + (" with changes" if changed else "")
 
 
 def _version(package: str) -> str | None:

@@ -10,13 +10,12 @@ from statistics import stdev
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import common
+from benchmarks.baselines import peers_here
 from benchmarks.judging import METRICS, in_processes
-from benchmarks.peer_search import peers_here
 from benchmarks.provenance import provenance
 from benchmarks.raw_options import add_raw, detectors_of, findings
 from benchmarks.raw_segments import SENSORS, RawFound, RawSegment, described, find_in, segments_in
 from benchmarks.recordings import JudgedRecording
-from benchmarks.steps import start
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
@@ -34,17 +33,6 @@ _JOINED_PERIODS = 1.5
 BYTETRACK, PAPER = "ByteTrack", "paper"
 CAUSAL, SMOOTHED = "causal", "smoothed"
 _ALL = "all"
-
-
-@dataclass(frozen=True, eq=False)
-class SizedRecording(JudgedRecording):
-    """Detections with their truth, and the picture that they were found in.
-
-    Attributes:
-        size_px: its width and height.
-    """
-
-    size_px: tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -145,13 +133,13 @@ def fused_rows(detector: str, presets: Sequence[str], with_peers: bool) -> list[
     return [Row((detector, detector), tracker, (FUSED_SENSOR,)) for tracker in trackers]
 
 
-def _recordings(found: Sequence[RawFound]) -> dict[tuple[str, str], dict[str, list[SizedRecording]]]:
+def _recordings(found: Sequence[RawFound]) -> dict[tuple[str, str], dict[str, list[JudgedRecording]]]:
     """Return recordings by data set, by pair of detectors with the detections of both sensors.
 
     A network of both sensors stands as `fused` and its name.
     """
     by_sensor: dict[str, dict[tuple[str, str, str], RawFound]] = {sensor: {} for sensor in SENSORS}
-    out: dict[tuple[str, str], dict[str, list[SizedRecording]]] = {}
+    out: dict[tuple[str, str], dict[str, list[JudgedRecording]]] = {}
     for one in found:
         asked = one.finding
         if asked.sensor == FUSED_SENSOR:
@@ -170,11 +158,11 @@ def _recordings(found: Sequence[RawFound]) -> dict[tuple[str, str], dict[str, li
     return out
 
 
-def _recording(segment: RawSegment, found: Detections) -> SizedRecording:
-    return SizedRecording(f"{segment.source}/{segment.name}", found, segment.truth(), segment.size_px())
+def _recording(segment: RawSegment, found: Detections) -> JudgedRecording:
+    return JudgedRecording(f"{segment.source}/{segment.name}", found, segment.truth(), segment.size_px())
 
 
-def _judge(job: tuple[Row, dict[str, list[SizedRecording]]]) -> list[dict[str, Any]]:
+def _judge(job: tuple[Row, dict[str, list[JudgedRecording]]]) -> list[dict[str, Any]]:
     """Judge one row in all data sets: a record for each, and for what it reports (causal, smoothed)."""
     row, by_source = job
     everything = {**by_source, _ALL: [one for group in by_source.values() for one in group]}
@@ -202,7 +190,7 @@ def _judge(job: tuple[Row, dict[str, list[SizedRecording]]]) -> list[dict[str, A
     return out
 
 
-def _tracked(row: Row, recording: SizedRecording) -> dict[str, Any]:
+def _tracked(row: Row, recording: JudgedRecording) -> dict[str, Any]:
     """Return the tables of a tracker, by what they are."""
     from benchmarks.baselines import run_baseline
     from jeat_graph.runs.latency import at_measurement
@@ -211,26 +199,24 @@ def _tracked(row: Row, recording: SizedRecording) -> dict[str, Any]:
     if row.tracker == BYTETRACK:
         return {CAUSAL: run_baseline("bytetrack", recording.detections, row.sensors)}
     seen = recording.only(row.sensors)
-    config = _config(row, seen, recording.size_px)
+    config = _config(row, seen, recording.image)
     seen = at_measurement(seen, config)
     if row.tracker == PAPER:
         return {CAUSAL: track(config, seen)}
     return dict(zip((CAUSAL, SMOOTHED), both_tables(config, seen), strict=True))
 
 
-def _config(row: Row, seen: Detections, size_px: tuple[int, int]) -> Config:
+def _config(row: Row, seen: Detections, image: tuple[float, float] | None) -> Config:
     """Return a preset for what is seen: what is known of the networks, their rates, and their picture.
 
     As in `track`, files beside the networks count with `default` alone.
     """
     from jeat_graph.runs.declaring import fit_input
 
-    width, height = size_px
-    changes = [f"image.width={width}", f"image.height={height}"]
+    changes = [] if image is None else [f"image.width={image[0]:g}", f"image.height={image[1]:g}"]
     if row.tracker == "default":
         changes += declared_settings(row.request())
-    fitted, _ = fit_input(load_config("default" if row.tracker == PAPER else row.tracker, changes), seen)
-    return start(load_config(PAPER), fitted) if row.tracker == PAPER else fitted
+    return fit_input(load_config(row.tracker, changes), seen)[0]
 
 
 def _scores(group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, kind: Any) -> dict[str, Any]:

@@ -1,11 +1,10 @@
-"""Recordings that trackers are judged on: simulated ones by scenario and seed, and real ones if present."""
+"""Recordings that trackers are judged on, and the sets in which their scores are pooled."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
@@ -14,12 +13,8 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 
 SCENARIOS = ("day", "night", "night-nolight")
-# Judged on these; the presets were calibrated on seeds 100 and 101, the baselines' parameters searched on
-# 100.
 SEEDS = (0, 1, 2, 3, 4)
 DURATION_S = 30.0
-KITTI_SEQUENCES = ("0004", "0005", "0008", "0010", "0018")
-KITTI_IMAGE = (1242.0, 375.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +22,16 @@ class JudgedRecording:
     """Detections with their truth.
 
     Attributes:
-        name: say `day/0` or `0004`.
+        name: say `day/0` or `MOT17-02`.
         detections: scans of all sensors.
         truth: boxes.
+        image: width and height of the picture (px), None where not known.
     """
 
     name: str
     detections: Detections
     truth: GroundTruth
+    image: tuple[float, float] | None = None
 
     def instants(self, sensors: Sequence[str] | None = None) -> FloatArray:
         """Times (T,) at which a tracker that is given `sensors` (all by default) reports."""
@@ -45,6 +42,31 @@ class JudgedRecording:
         return self.detections if sensors is None else self.detections.select(sensors)
 
 
+@dataclass(frozen=True, eq=False)
+class RecordingSet:
+    """Recordings of one kind, whose scores are pooled.
+
+    Attributes:
+        name: in the tables.
+        recordings: in the order of their names.
+    """
+
+    name: str
+    recordings: tuple[JudgedRecording, ...]
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the detectors; of several, the slowest comes first: it sets the frames of the peers."""
+        first = self.recordings[0].detections
+        return tuple(sorted(first.sensors, key=lambda name: (len(first.sensor_times(name)), name != "rgb")))
+
+    @property
+    def streams(self) -> list[tuple[str, ...]]:
+        """What a tracker is given in turn: all detectors, then each alone."""
+        alone: list[tuple[str, ...]] = [(name,) for name in self.sensors]
+        return alone if len(alone) == 1 else [self.sensors, *alone]
+
+
 @lru_cache(maxsize=8)
 def simulated(scenario: str, seed: int, duration_s: float = DURATION_S) -> JudgedRecording:
     """Simulate a recording; the last few are kept."""
@@ -53,30 +75,3 @@ def simulated(scenario: str, seed: int, duration_s: float = DURATION_S) -> Judge
 
     detections, truth = simulate(load_scenario(scenario), seed=seed, duration_s=duration_s)
     return JudgedRecording(f"{scenario}/{seed}", detections, truth)
-
-
-def find_kitti(data: str | Path | None = None) -> Path | None:
-    """Folder with the KITTI sequences, or None where it is missing.
-
-    Args:
-        data: folder that holds `kitti`; by default `../shared/data` beside the working directory.
-    """
-    folder = Path("../shared/data" if data is None else data) / "kitti"
-    complete = all((folder / s / "detections.csv").is_file() for s in KITTI_SEQUENCES)
-    return folder if complete else None
-
-
-@lru_cache(maxsize=1)
-def kitti(folder: Path) -> tuple[JudgedRecording, ...]:
-    """Read the KITTI sequences, in order."""
-    from jeat_graph.io.detections_io import read_detections
-    from jeat_graph.io.truth_io import read_truth
-
-    out = []
-    for name in KITTI_SEQUENCES:
-        detections = read_detections(folder / name / "detections.csv")
-        truth = read_truth(folder / name / "gt.csv")
-        # Frames without any vehicle are frames too: a track there is false.
-        frames = np.unique(np.concatenate([truth.frame_times(), detections.scan_t]))
-        out.append(JudgedRecording(name, detections, replace(truth, frames=frames)))
-    return tuple(out)

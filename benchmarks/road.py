@@ -70,7 +70,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     jobs = [(folder, which, settings["every_minutes"]) for which in sets for folder in folders]
     return {
         "benchmark": "road",
-        **provenance(settings, {"highway": load_config("highway")}),
+        **provenance(settings, {"default": load_config("default")}),
         "simulated": [one for scene in simulated for one in scene],
         "real": in_processes(_judge_real, jobs, args.jobs, "real cameras"),
         "costs": road_costs(_QUICK_DURATION_S if args.quick else _COST_DURATION_S),
@@ -106,17 +106,17 @@ def judge_scene(job: tuple[str, int, float]) -> list[dict[str, Any]]:
         scene, run = Path(folder) / "scene", Path(folder) / "run"
         write_detection_set(load_scenario(scenario), scenario, scene, seed, duration_s, lambda: None)
         options = RunOptions(diagnostics=True)
-        track_files(TrackRequest((str(scene / "detections.csv"),), str(run), "highway", options=options))
+        track_files(TrackRequest((str(scene / "detections.csv"),), str(run), "default", options=options))
         exact = read_camera(scene / "camera.yaml")
         spread = np.array([_SPREAD.get(name, 0.0) for name in PARAMETERS])
         change = spread * np.random.default_rng(seed).standard_normal(len(spread))
         wrong = replace(exact.moved(change), covariance=np.diag(spread**2))
         for name, camera in zip(_CAMERAS, (exact, wrong), strict=True):
-            write_run_tables(run, load_config("highway"), camera)
+            write_run_tables(run, load_config("default"), camera)
             for table, scores in judge_road_run(run, scene / "gt_road.csv").items():
                 kind = table.removeprefix("road_")
                 out.append({"scenario": scenario, "seed": seed, "camera": name, "table": kind, **scores})
-        for kind, scores in judge_engines(run, scene / "gt_road.csv", load_config("highway"), exact).items():
+        for kind, scores in judge_engines(run, scene / "gt_road.csv", load_config("default"), exact).items():
             out.append({"scenario": scenario, "seed": seed, "camera": "exact", "table": kind, **scores})
     return out
 

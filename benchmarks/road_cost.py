@@ -34,7 +34,7 @@ def causal_cost(duration_s: float) -> dict[str, Any]:
     from jeat_graph_sehn.simulation.dataset.detection_set import write_detection_set
     from jeat_graph_sehn.simulation.scenario import load_scenario
 
-    config = load_config("highway")
+    config = load_config("default")
     alone = replace(config, smoother=replace(config.smoother, engine="none"))
     with tempfile.TemporaryDirectory() as folder:
         write_detection_set(load_scenario("day"), "day", Path(folder), 21, duration_s, lambda: None)
@@ -69,7 +69,7 @@ def lag_cost(duration_s: float) -> dict[str, Any]:
     from jeat_graph.road.fixed_lag import RoadFixedLag
 
     camera, log = many_vehicles(duration_s)
-    smoother = RoadFixedLag(camera, load_config("highway"))
+    smoother = RoadFixedLag(camera, load_config("default"))
     begin, cut = 0.0, _LEAVE_OUT_S  # what is compiled and imported first is not counted
     for rows in np.split(log, np.flatnonzero(np.diff(log["t"])) + 1):
         t = float(rows["t"][0])

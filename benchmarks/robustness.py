@@ -14,7 +14,6 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 
 SCENARIO, DARK = "day", "night-nolight"
-PRESETS = ("default", "highway")
 _LATE_S = 0.05
 _SWAY_PX, _SWAY_HZ = 6.0, 0.7
 _POOR = "third"
@@ -84,24 +83,6 @@ def varied(name: str, seed: int, duration_s: float) -> JudgedRecording:
     detections, truth = simulate(scenario_from_dict(tree), seed=seed, duration_s=duration_s)
     recording = JudgedRecording(f"{name}/{seed}", detections, truth)
     return recording if one.change is None else one.change(recording)
-
-
-def judge_variation(job: tuple[str, str, int, float]) -> dict[str, Any]:
-    """Track and judge one variation: (preset, variation, seed, duration)."""
-    from benchmarks.judging import judge_recordings
-    from jeat_graph.config.reading import load_config
-    from jeat_graph.runs.declaring import fit_input
-
-    preset, name, seed, duration_s = job
-    recording = varied(name, seed, duration_s)
-    config = load_config(preset, ("input.undeclared=declare",))
-    config = fit_input(config, recording.detections)[0]
-    return {
-        "row": preset,
-        "scenario": name,
-        "seed": seed,
-        "scores": judge_recordings(config, [recording]),
-    }
 
 
 def _meaningless_scores(one: JudgedRecording) -> JudgedRecording:

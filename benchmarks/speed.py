@@ -42,9 +42,6 @@ def run(args: argparse.Namespace) -> int:
     """Measure, print the tables, write the files."""
     if args.quick:
         args.objects, args.frames, args.warm_up, args.repeats = args.objects[:2], 20, 15, 1
-    from jeat_graph.tracking.notice import notice_if_cold
-
-    notice_if_cold()
     if not args.quick:
         # The first child may have to compile; its time counts nowhere.
         ask({"job": "start_up"})
@@ -138,7 +135,7 @@ def _tables(result: dict[str, Any]) -> str:
                 f"  {row['times_faster']:.1f} ({row['times_faster_min']:.1f} … {row['times_faster_max']:.1f})"
             )
         lines.append(line)
-    lines += ["", "Times real time, `highway`, events at 100 Hz and RGB at 20 Hz"]
+    lines += ["", "Times real time, `default`, events at 100 Hz and RGB at 20 Hz"]
     lines += [f"{'vehicles':>8}" + "".join(f"{engine:>15}" for engine in ENGINES)]
     for num in dict.fromkeys(row["vehicles"] for row in result["real_time"]):
         mine = {r["smoother"]: r["times_real_time"] for r in result["real_time"] if r["vehicles"] == num}
@@ -165,7 +162,7 @@ def _write(result: dict[str, Any], args: argparse.Namespace) -> None:
     from jeat_graph.io.atomic import open_atomic
 
     settings = {key: getattr(args, key) for key in ("objects", "frames", "warm_up", "repeats", "clock")}
-    head = provenance(settings, {name: load_config(name) for name in ("highway", "paper")})
+    head = provenance(settings, {name: load_config(name) for name in ("default", "paper")})
     folder = Path(args.out)
     with open_atomic(folder / "speed.json") as file:
         json.dump({**head, **result}, file, indent=1)

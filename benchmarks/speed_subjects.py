@@ -16,10 +16,10 @@ from jeat_graph.tracking.tracker import Tracker
 
 #: Ours: preset and engine of the smoother.
 OURS = {
-    "highway": ("highway", "none"),
+    "default": ("default", "none"),
     "paper": ("paper", "none"),
-    "highway + fixed-lag": ("highway", "fixed-lag"),
-    "highway + fixed-lag-rts": ("highway", "fixed-lag-rts"),
+    "default + fixed-lag": ("default", "fixed-lag"),
+    "default + fixed-lag-rts": ("default", "fixed-lag-rts"),
 }
 #: Peers of the package `trackers`, by their key in `eval.baselines.BASELINES`.
 PEERS = ("bytetrack", "sort", "ocsort")

@@ -105,7 +105,7 @@ def summarise(runs: Sequence[dict[str, tuple[FloatArray, float]]]) -> list[dict[
 def real_time_factor(
     num_objects: int, engine: str, duration_s: float, *, seed: int = 0, clock: str = "wall"
 ) -> float:
-    """How many times faster than real time vehicles seen at 100 + 20 Hz are tracked by `highway`.
+    """How many times faster than real time vehicles seen at 100 + 20 Hz are tracked by `default`.
 
     Args:
         num_objects: vehicles in the picture.
@@ -124,7 +124,7 @@ def real_time_factor(
             frame = scene.scan(k / 100, rng)
             batch.append(Scan(frame.t, "rgb", frame.boxes, frame.scores))
         batches.append(batch)
-    tracker = tracker_for("highway", engine)
+    tracker = tracker_for("default", engine)
     step = stepper(tracker)
     now = _CLOCKS[clock]
     before = now()

@@ -88,7 +88,7 @@ def start_up() -> dict[str, float]:
     package = time.perf_counter()
     tracker_class, load_config = jeat_graph.Tracker, jeat_graph.load_config
     imported = time.perf_counter()
-    tracker = tracker_class(load_config("highway", ["smoother.engine=none"]))
+    tracker = tracker_class(load_config("default", ["smoother.engine=none"]))
     tracker.step((0.0, "rgb", [[100.0, 100.0, 40.0, 30.0]], [0.9]))
     first = time.perf_counter()
     return {
@@ -116,7 +116,7 @@ def endurance(scans: int, objects: int) -> dict[str, Any]:
     from benchmarks.speed_scene import SpeedScene
     from benchmarks.speed_subjects import tracker_for
 
-    tracker = tracker_for("highway", "none")
+    tracker = tracker_for("default", "none")
     scene = SpeedScene(objects, 0)
     rng = np.random.default_rng(0)
     resident, per_scan = [], []

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from benchmarks.baselines.frames import BaselineFrame
 from benchmarks.baselines.inputs import baseline_frames
-from benchmarks.baselines.running import BASELINES, missing_packages, run_baseline
-from benchmarks.baselines.search import SEARCH_GRIDS, BaselineResult, best_baseline, judge_baseline
+from benchmarks.baselines.running import BASELINES, NAMES, missing_packages, peers_here, run_baseline
 
 __all__ = [
     "BASELINES",
-    "SEARCH_GRIDS",
+    "NAMES",
     "BaselineFrame",
-    "BaselineResult",
     "baseline_frames",
-    "best_baseline",
-    "judge_baseline",
     "missing_packages",
+    "peers_here",
     "run_baseline",
 ]

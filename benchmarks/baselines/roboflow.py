@@ -1,4 +1,4 @@
-"""SORT, ByteTrack, OC-SORT and BoT-SORT (without appearance) of the package `trackers`."""
+"""SORT, ByteTrack, OC-SORT, BoT-SORT, C-BIoU and McByte of the package `trackers`, without pictures."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ ROBOFLOW: dict[str, tuple[str, dict[str, Any]]] = {
     "sort": ("SORTTracker", {}),
     "bytetrack": ("ByteTrackTracker", {}),
     "ocsort": ("OCSORTTracker", {}),
-    # There is no picture to estimate the camera's motion from.
+    # There is no picture to estimate the camera's motion from, nor to find masks in.
     "botsort": ("BoTSORTTracker", {"enable_cmc": False}),
+    "cbiou": ("CBIoUTracker", {}),
+    "mcbyte": ("McByteTracker", {"enable_cmc": False}),
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from importlib.util import find_spec
 from typing import Any
@@ -14,6 +15,7 @@ from benchmarks.baselines.norfair import NorfairTracker
 from benchmarks.baselines.roboflow import ROBOFLOW, RoboflowTracker
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.extras import install
 from jeat_graph.data.trajectories import Trajectories
 
 # Name: packages that it needs.
@@ -21,11 +23,43 @@ BASELINES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(ROBOFLOW, ("trackers", "supervision")),
     "norfair": ("norfair",),
 }
+#: How they are called in tables.
+NAMES = {
+    "sort": "SORT",
+    "bytetrack": "ByteTrack",
+    "ocsort": "OC-SORT",
+    "botsort": "BoT-SORT",
+    "cbiou": "C-BIoU",
+    "mcbyte": "McByte",
+    "norfair": "Norfair",
+}
+_INSTALL = {
+    "trackers": f"{install('baselines')} && pip install --no-deps trackers",
+    "supervision": install("baselines"),
+    "norfair": "pip install rich filterpy && pip install --no-deps norfair",
+}
 
 
 def missing_packages(name: str) -> list[str]:
     """Packages that a baseline needs and that are not installed."""
     return [package for package in BASELINES[name] if find_spec(package) is None]
+
+
+def peers_here() -> list[str]:
+    """Names of the baselines whose packages are installed; a line on stderr says which are left out."""
+    here, lacking = [], dict[str, list[str]]()
+    for name, shown in NAMES.items():
+        missing = missing_packages(name)
+        if missing:
+            lacking.setdefault(missing[0], []).append(shown)
+        else:
+            here.append(name)
+    for package, left_out in lacking.items():
+        names = ", ".join(left_out)
+        print(
+            f"the package {package} is not installed: {names} left out ({_INSTALL[package]})", file=sys.stderr
+        )
+    return here
 
 
 def run_baseline(

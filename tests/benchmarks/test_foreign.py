@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from benchmarks.foreign import WorldJob, judge_world, recorded, worlds, worlds_table
+from benchmarks.foreign import recorded, worlds
 from benchmarks.foreign_routes import CAR, Route, crossing, roundabout, square, street
 from benchmarks.foreign_scenes import is_red, populate
 from jeat_graph_sehn.simulation.world.camera import CameraConfig
@@ -119,19 +119,3 @@ def test_names_differ_and_the_same_seed_gives_the_same_bytes():
 
 def test_without_scores_all_are_one():
     assert (recorded("crossing, no scores", 0, 1.0).detections.scores == 1.0).all()
-
-
-def test_a_world_is_judged_and_the_best_of_the_others_is_named():
-    records = judge_world(WorldJob("street", 0, 2.0, ()))
-    assert [r["kind"] for r in records] == ["causal", "smoothed"]
-    ours = {"MOTA": 50.0, "IDF1": 50.0, "HOTA": 50.0}
-
-    def record(row, kind, seed, **scores):
-        return {"world": "street", "seed": seed, "row": row, "kind": kind, "scores": ours | scores}
-
-    made = [record("default", kind, seed) for kind in ("causal", "smoothed") for seed in (0, 1)]
-    made += [record("A", "causal", seed, MOTA=60.0 + seed, IDF1=10.0) for seed in (0, 1)]
-    made += [record("B", "causal", seed, MOTA=61.0 - 9.0 * seed, IDF1=11.0) for seed in (0, 1)]
-    row = worlds_table(made, 2).render("markdown").splitlines()[-1]
-    assert "60.5±0.7 (A)" in row
-    assert "11.0±0.0 (B)" in row

@@ -43,7 +43,7 @@ def test_without_the_reference_there_is_no_ratio():
     assert "times_faster" not in record
 
 
-@pytest.mark.parametrize("name", ["highway", "paper"])
+@pytest.mark.parametrize("name", ["default", "paper"])
 def test_our_tracker_holds_all_objects_of_the_scene(name):
     run = time_side_by_side([name], 60, frames=10, warm_up=30, seed=0)
     times, reported = run[name]
@@ -79,7 +79,7 @@ def test_the_command_writes_table_json_and_plots(tmp_path, monkeypatch, capsys):
     assert "times real time" in capsys.readouterr().out.lower()
     result = json.loads((tmp_path / "speed.json").read_text())
     assert {(row["objects"], row["tracker"]) for row in result["steps"]} == {
-        (5, name) for name in ("highway", "paper")
+        (5, name) for name in ("default", "paper")
     }
     assert {row["smoother"] for row in result["real_time"]} == set(ENGINES)
     assert (tmp_path / "speed.png").stat().st_size > 0

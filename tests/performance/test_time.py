@@ -56,7 +56,7 @@ def test_our_step_takes_less_than_a_sixth_of_bytetracks():
     """Undisturbed it is an eighth or less, by processor; with others at work cold caches cost us more."""
     if not installed_peers():
         pytest.skip("the package trackers is not installed")
-    names, faster = ["highway", "bytetrack"], []
+    names, faster = ["default", "bytetrack"], []
     while len(faster) < 8 and max(faster, default=0.0) < 6.0:
         run = time_side_by_side(names, 50, frames=30, warm_up=20, seed=len(faster), clock="cpu")
         faster.append(summarise([run])[0]["times_faster"])
@@ -67,8 +67,8 @@ def test_a_step_grows_no_faster_than_linearly_to_500_tracks():
     least = {100: np.inf, 500: np.inf}
     for _ in range(8):
         for num, seconds in least.items():
-            timed = time_side_by_side(["highway"], num, frames=30, warm_up=20, seed=0, clock="cpu")
-            least[num] = min(seconds, np.quantile(timed["highway"][0], 0.25))
+            timed = time_side_by_side(["default"], num, frames=30, warm_up=20, seed=0, clock="cpu")
+            least[num] = min(seconds, np.quantile(timed["default"][0], 0.25))
         # A fifth of the frames hold births and deaths, which scatter: a quarter more than five times may be.
         if least[500] <= 1.25 * 5.0 * least[100]:
             return

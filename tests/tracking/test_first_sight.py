@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import io
 import json
-import warnings
 
 import numpy as np
 import pytest
 
 from jeat_graph import Scan, Tracker, Trajectories, load_config
 from jeat_graph.cli.main import main
-from jeat_graph.data.errors import InputWarning, UnknownSensorError
+from jeat_graph.data.errors import UnknownSensorError
 from jeat_graph.live.late import LiveTracker
-from jeat_graph.tracking import first_sight, notice
+from jeat_graph.tracking import first_sight
 
 IMAGE = (1280, 720)
 
@@ -41,7 +40,7 @@ def test_a_tracker_that_meets_a_sensor_is_as_if_it_had_been_declared():
         Trajectories.concatenate([meets.step(one) for one in scans()]),
         Trajectories.concatenate([known.step(one) for one in scans()]),
     )
-    assert meets.sensor_names == known.sensor_names == ("cam1", "evt", "rgb", "thermal")
+    assert meets.config.sensor_names == known.config.sensor_names == ("cam1", "thermal")
     assert_same(meets.finish(), known.finish())
 
 
@@ -58,38 +57,25 @@ def test_rows_that_were_drained_before_do_not_come_again():
     assert_same(smoothed(Tracker(image=IMAGE)), smoothed(known))
 
 
-def test_seven_sensors_of_any_names(capsys):
-    notice.forget()
-    notice._said.discard(notice.MANY)
+def test_seven_sensors_of_any_names():
     names = ["cam1", "Kamera Süd", "lidar/2", "a", "b", "c", "d"]
     tracker = Tracker(image=IMAGE)
     for k in range(30):
         for j, name in enumerate(names):
             table = tracker.update(scan(k, name).boxes, t=k / 20.0 + j / 200.0, sensor=name)
     assert len(table) == 2
-    assert set(names) < set(tracker.sensor_names)
-    assert capsys.readouterr().err.count("more than 3 sensors") == 1
+    assert set(names) == set(tracker.sensor_names)
 
 
-def test_who_comes_too_late_to_be_told_of_begins_anew_and_says_so(monkeypatch):
-    monkeypatch.setattr(first_sight, "MOST_CALLS", 10)
+def test_who_comes_late_ends_no_track():
     tracker = Tracker(image=IMAGE)
-    told = []
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        told = [tracker.step(one) for one in scans()]
-    lines = [str(w.message) for w in caught if issubclass(w.category, InputWarning)]
-    assert len(lines) == 1
-    assert "'thermal'" in lines[0]
-    before = set(told[19].track_id.tolist())
-    after = set(told[-1].track_id.tolist())
-    assert len(before) == len(after) == 2
-    assert not before & after
-    assert {*before, *after} <= set(tracker.finish().track_id.tolist())
+    told = [tracker.step(one) for one in scans(400, late=300)]
+    assert told[299].track_id.tolist() == told[-1].track_id.tolist() == [1, 2]
 
 
 def test_a_configuration_that_declares_nobody_refuses_as_before():
-    tracker = Tracker("highway", image=IMAGE)
+    settings = ["sensors.rgb={}", "input.undeclared=refuse"]
+    tracker = Tracker(load_config("default", settings), image=IMAGE)
     with pytest.raises(UnknownSensorError, match="cam1"):
         tracker.step(scan(0, "cam1"))
     with pytest.raises(UnknownSensorError, match="cannot be a name"):

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--net",
         choices=_NETS,
         default="medium",
-        help="size: about .04, .15, .6 (default) or 1.3 million parameters; of both sensors twice as many",
+        help="size: about 0.04, 0.15, 0.6 (default) or 1.3 million parameters; of both sensors twice as many",
     )
     add(
         "--size",

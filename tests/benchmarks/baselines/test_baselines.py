@@ -7,20 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.baselines import (
-    SEARCH_GRIDS,
-    baseline_frames,
-    best_baseline,
-    judge_baseline,
-    missing_packages,
-    run_baseline,
-)
+from benchmarks.baselines import baseline_frames, run_baseline
 from benchmarks.baselines.inputs import suppress_overlapping
 from benchmarks.baselines.roboflow import ROBOFLOW
-from benchmarks.baselines.search import grid
 from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, UnknownSensorError
+from jeat_graph.eval.metrics import Scores, evaluate
 
 from ...eval.data import KITTI, kitti, make_truth
 
@@ -47,6 +40,12 @@ def scene_truth(frames=40):
     return make_truth(t, [1, 2] * frames, boxes)
 
 
+def judged(name, sequences, **parameters) -> Scores:
+    """Scores of a baseline, pooled over (truth, detections)."""
+    pairs = [(truth, run_baseline(name, found, ["rgb"], **parameters)) for truth, found in sequences]
+    return evaluate(pairs, instants=[np.unique(found.sensor_times("rgb")) for _, found in sequences])
+
+
 @pytest.fixture(autouse=True)
 def _trackers():
     pytest.importorskip("trackers", reason="needs the package trackers (extra baselines)")
@@ -54,9 +53,9 @@ def _trackers():
 
 @pytest.mark.parametrize("name", sorted(ROBOFLOW))
 def test_each_baseline_tracks_two_vehicles_without_a_switch(name):
-    result = judge_baseline(name, [(scene_truth(), scene())], ["rgb"])
-    assert (result.scores.FP, result.scores.IDSW, result.scores.track_ids) == (0, 0, 2)
-    assert result.scores.FN <= 6  # the frames before confirmation
+    scores = judged(name, [(scene_truth(), scene())])
+    assert (scores.FP, scores.IDSW, scores.track_ids) == (0, 0, 2)
+    assert scores.FN <= 6  # the frames before confirmation
 
 
 @pytest.mark.parametrize("name", sorted(ROBOFLOW))
@@ -127,39 +126,15 @@ def test_mistakes_are_named():
         run_baseline("sort", scene(), ["evt"])
 
 
-@pytest.mark.parametrize("name", sorted(SEARCH_GRIDS))
-def test_every_point_of_a_search_grid_is_a_valid_set_of_parameters(name):
-    if missing_packages(name):
-        pytest.skip(f"needs the package {missing_packages(name)[0]}")
-    for parameters in grid(name):
-        assert run_baseline(name, scene(frames=2), ["rgb"], **parameters) is not None
-
-
 def test_a_baseline_run_twice_gives_the_same():
     first, second = (run_baseline("bytetrack", scene(), ["rgb"]) for _ in range(2))
     assert np.array_equal(first.track_id, second.track_id)
     assert np.array_equal(first.mean, second.mean)
 
 
-def test_a_search_never_ends_below_the_defaults_and_says_where_it_began(monkeypatch):
-    flicker = [k for k in range(40) if k % 3 == 0]  # SORT asks for three frames in a row: none ever come
-    monkeypatch.setitem(SEARCH_GRIDS, "sort", {"minimum_consecutive_frames": (5, 1)})
-    found = best_baseline("sort", [(scene_truth(), scene(gap=flicker))], ["rgb"])
-    assert dict(found.parameters) == {"minimum_consecutive_frames": 1}
-    assert found.tried == 3
-    assert found.default == judge_baseline("sort", [(scene_truth(), scene(gap=flicker))], ["rgb"]).scores
-    assert found.scores.MOTA > found.default.MOTA
-
-
-def test_a_grid_leaves_out_what_does_the_same_as_another_point():
-    points = list(grid("bytetrack"))
-    assert all(p["track_activation_threshold"] >= p["high_conf_det_threshold"] for p in points)
-    assert {p["high_conf_det_threshold"] for p in points} == {0.2, 0.4, 0.6, 0.8}
-
-
 def test_sort_and_bytetrack_on_the_kitti_camera_detections_score_as_they_are_known_to():
     sequences = [kitti(name) for name in KITTI]
     for name in ("sort", "bytetrack"):
-        scores = judge_baseline(name, sequences, ["rgb"]).scores
+        scores = judged(name, sequences)
         assert 82 < scores.MOTA < 85
         assert 88 < scores.IDF1 < 92

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.baselines import judge_baseline, run_baseline
+from benchmarks.baselines import run_baseline
 from benchmarks.baselines.frames import BaselineFrame
 from benchmarks.baselines.norfair import NorfairTracker
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError
 
-from .test_baselines import RATE, SPEED, scene, scene_truth
+from .test_baselines import RATE, SPEED, judged, scene, scene_truth
 
 norfair = pytest.importorskip("norfair", reason="needs norfair: pip install --no-deps norfair")
 
 
 def test_two_vehicles_are_tracked_without_a_switch_once_they_are_confirmed():
-    scores = judge_baseline("norfair", [(scene_truth(), scene())], ["rgb"], initialization_delay=3).scores
+    scores = judged("norfair", [(scene_truth(), scene())], initialization_delay=3)
     assert (scores.FP, scores.IDSW, scores.track_ids) == (0, 0, 2)
     assert scores.FN == 2 * 3
 

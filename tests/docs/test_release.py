@@ -1,0 +1,62 @@
+"""What a release needs: one version everywhere, licences of what is compiled in, files that hosts read."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+from jeat_graph.version import __version__
+
+ROOT = Path(__file__).parents[2]
+_CALL = re.compile(r"(?:`|run: |- |^)make ([\w./-]+)", re.MULTILINE)
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+
+
+def test_the_version_is_the_same_in_the_package_the_simulator_and_the_citation():
+    sehn = (ROOT / "sehn" / "jeat_graph_sehn" / "version.py").read_text(encoding="utf-8")
+    assert re.findall(r'__version__ = "(.+)"', sehn) == [__version__]
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["version"] == __version__
+    assert citation["license"] == "Apache-2.0"
+
+
+@pytest.mark.parametrize("name", ["nanobind", "robin-map"])
+def test_licences_of_what_is_compiled_into_the_core_go_into_the_wheel(name):
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert "licenses/*.txt" in project["license-files"]
+    text = (ROOT / "licenses" / f"{name}.txt").read_text(encoding="utf-8")
+    assert "Copyright (c)" in text
+    assert "WARRANT" in text
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_a_workflow_may_write_nothing_but_what_a_job_asks_for(path):
+    flow = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert flow["permissions"] == {"contents": "read"}
+    for job in flow["jobs"].values():
+        assert job["timeout-minutes"] <= 180
+        for step in job["steps"]:
+            if step.get("uses", "").startswith("actions/checkout@"):
+                assert step["with"]["persist-credentials"] is False
+
+
+def test_make_targets_that_workflows_and_the_host_of_the_documentation_call_exist():
+    targets = set(
+        re.findall(r"^([\w.$()/-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    targets |= {one.replace("$(VENV)", ".venv") for one in targets}
+    files = [*WORKFLOWS, ROOT / ".readthedocs.yaml", ROOT / "CONTRIBUTING.md"]
+    called = {one for path in files for one in _CALL.findall(path.read_text(encoding="utf-8"))}
+    assert {"reproducible", "sbom", "docs", "core"} <= called
+    assert called <= targets
+
+
+def test_files_that_the_guide_for_contributors_names_are_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = [one for one in re.findall(r"`((?:jeat_graph|tests|docs)/[\w./-]+)`", text) if "NAME" not in one]
+    assert len(named) > 8
+    assert [one for one in named if not (ROOT / one).exists()] == []
