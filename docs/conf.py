@@ -53,5 +53,17 @@ html_search_scorer = str(Path(__file__).parent / "_static" / "scorer.js")
 html_copy_source = False
 html_show_sphinx = False
 # Shown by their names, not as the unions that they stand for.
-_NAMED = ("FloatArray", "IntArray", "BoolArray", "TextArray", "RecordArray", "EmbeddingArray", "PathLike", "ScanLike")
-autodoc_type_aliases = {name: name for name in _NAMED} | {"npt.ArrayLike": "ArrayLike", "ArrayLike": "ArrayLike"}
+_NAMED = (
+    "FloatArray",
+    "IntArray",
+    "BoolArray",
+    "TextArray",
+    "RecordArray",
+    "EmbeddingArray",
+    "PathLike",
+    "ScanLike",
+)
+autodoc_type_aliases = {name: name for name in _NAMED} | {
+    "npt.ArrayLike": "ArrayLike",
+    "ArrayLike": "ArrayLike",
+}

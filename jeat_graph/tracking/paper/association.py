@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.tracking.paper.kalman import noise_of
-from jeat_graph.tracking.paper.state import Found, Tracks
+from jeat_graph.tracking.paper.state import Found, PaperTracks
 
 _HAIR = 1.000001
 
@@ -32,7 +32,7 @@ class Pairs(NamedTuple):
         return Pairs(*(column[which] for column in self))
 
 
-def gated_pairs(tracks: Tracks, found: Found, gate: float) -> Pairs:
+def gated_pairs(tracks: PaperTracks, found: Found, gate: float) -> Pairs:
     """List the pairs whose squared Mahalanobis distance is inside the gate (paper eq. 5).
 
     d² = yᵀ S⁻¹ y with y = z − H x and S = H P Hᵀ + R; S is a multiple of the unit matrix here. Detections are
@@ -52,7 +52,9 @@ def gated_pairs(tracks: Tracks, found: Found, gate: float) -> Pairs:
     first = np.searchsorted(x, at[:, 0] - half)
     count = np.searchsorted(x, at[:, 0] + half, side="right") - first
     row = np.repeat(np.arange(n), count)
-    detection = order[np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)]
+    detection = order[
+        np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)
+    ]
     y = found.z[detection] - at[row]
     S = position_var[row] + noise_of(tracks, row, found, detection)
     d2 = (y * y).sum(axis=1) / S

@@ -182,7 +182,12 @@ def solve(paths: Sequence[TrackPath], counts: Sequence[int], whole: bool = False
         ends = [np.stack([piece.motion.mean[-1] for piece in pieces]), None]
         ends[1] = np.stack([piece.size.mean[-1] for piece in pieces])
         if j == 0:
-            state = [ends[0].copy(), np.stack([p.cov for p in pieces]), ends[1], np.stack([p.size_cov for p in pieces])]
+            state = [
+                ends[0].copy(),
+                np.stack([p.cov for p in pieces]),
+                ends[1],
+                np.stack([p.size_cov for p in pieces]),
+            ]
         mean, cov, size_mean, size_cov = (one[: len(active)] for one in state)
         for n, known in enumerate(solved[: len(active)]):
             if known is not None:
@@ -193,8 +198,12 @@ def solve(paths: Sequence[TrackPath], counts: Sequence[int], whole: bool = False
                 size = smoothed_by(piece.size, piece.size.mean[-1], size_mean[n], size_cov[n])
                 stop = len(piece.t) if whole and j == 0 else -1
                 out[i].append(Rows(*(one[:stop] for one in (piece.t, piece.used, *motion, *size))))
-        first = Given(*(np.stack(part) for part in zip(*((a[0] for a in p.motion) for p in pieces), strict=True)))
-        first_size = Given(*(np.stack(part) for part in zip(*((a[0] for a in p.size) for p in pieces), strict=True)))
+        first = Given(
+            *(np.stack(part) for part in zip(*((a[0] for a in p.motion) for p in pieces), strict=True))
+        )
+        first_size = Given(
+            *(np.stack(part) for part in zip(*((a[0] for a in p.size) for p in pieces), strict=True))
+        )
         state = [
             *smoothed_by(first, ends[0], mean, cov),
             *smoothed_by(first_size, ends[1], size_mean, size_cov),

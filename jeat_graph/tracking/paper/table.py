@@ -10,11 +10,11 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.classes import ClassTally
-from jeat_graph.tracking.paper.state import Tracks
+from jeat_graph.tracking.paper.state import PaperTracks
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prediction(Trajectories):
+class PaperPrediction(Trajectories):
     """A table of predicted tracks, with the whole covariance of their motion.
 
     Attributes:
@@ -25,7 +25,7 @@ class Prediction(Trajectories):
 
 
 def table_of(
-    tracks: Tracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
+    tracks: PaperTracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
 ) -> Trajectories:
     """Write tracks as a table: what is confirmed is taken for a vehicle, existence 1."""
     size = tracks.sizes()
@@ -65,11 +65,11 @@ def boxes_at(centre: FloatArray, size: FloatArray, config: Config) -> tuple[Floa
 
 
 def predicted(
-    tracks: Tracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
-) -> Prediction:
+    tracks: PaperTracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
+) -> PaperPrediction:
     """Write predicted tracks as a table with covariances; those that have left the picture are left out."""
     table = table_of(tracks, t, config, sensors, classes)
     kept = tracks.take(np.isin(tracks.track_id, table.track_id))
     cov = np.zeros((len(kept), 6, 6))
     cov[:, ::2, ::2] = cov[:, 1::2, 1::2] = kept.cov
-    return Prediction(**vars(table), cov=cov)
+    return PaperPrediction(**vars(table), cov=cov)

@@ -24,9 +24,9 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names
 from jeat_graph.tracking.paper.smoothing import PaperSmoothers, StepTaken
-from jeat_graph.tracking.paper.state import Found, Tracks
+from jeat_graph.tracking.paper.state import Found, PaperTracks
 from jeat_graph.tracking.paper.step import predict, step
-from jeat_graph.tracking.paper.table import Prediction, predicted, table_of
+from jeat_graph.tracking.paper.table import PaperPrediction, predicted, table_of
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
 
@@ -47,7 +47,7 @@ class PaperSnapshot(NamedTuple):
 
     t: float | None
     next_id: int
-    tracks: Tracks
+    tracks: PaperTracks
     classes: ClassTally | None
     sensor_names: tuple[str, ...]
 
@@ -82,7 +82,7 @@ class PaperTracker:
         self.sensor_names = self.config.sensor_names
         self._settings: PaperConfig = self.config.paper
         self._common = CommonPicture.of(self.config)
-        self._tracks = Tracks.none(len(self.sensor_names))
+        self._tracks = PaperTracks.none(len(self.sensor_names))
         self._t: float | None = None
         self._next_id = 1
         self._classes: ClassTally | None = None
@@ -204,7 +204,7 @@ class PaperTracker:
         table = table_of(self._reported(), t, self.config, self.sensor_names, self._classes)
         return replace(table, instants=None if self._t is None else np.array([t]))
 
-    def predict(self, t: float) -> Prediction:
+    def predict(self, t: float) -> PaperPrediction:
         """Say where the confirmed tracks will be at a time, and how surely; the tracker stays as it is.
 
         Args:
@@ -275,7 +275,7 @@ class PaperTracker:
             raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
         return self._smoothers
 
-    def _reported(self) -> Tracks:
+    def _reported(self) -> PaperTracks:
         return self._tracks.take(self._tracks.confirmed)
 
     def _with_met(self, batch: Sequence[Scan]) -> tuple[str, ...]:
