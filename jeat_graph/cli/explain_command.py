@@ -15,7 +15,7 @@ from jeat_graph.eval.tables import FORMATS
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.runs.explaining import ExplainedMoment, ExplainedPlace
+    from jeat_graph.runs.explaining import TrackMoment, Place
 
 WRITES = ("out",)
 HELP = "say why something in a run is a track, or is not: the terms of its log odds over time"
@@ -45,9 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--at", type=_place, metavar="T,X,Y", help="what is, or is not, at a time (s) and a place (px)"
     )
     add("--out", metavar="FILE", help="also plot a track's terms there (.png, .svg, .pdf)")
-    add(
-        "--detections", nargs="+", metavar="FILE", help="the run's inputs, in their order, if they have moved"
-    )
+    add("--detections", nargs="+", metavar="FILE", help="the run's inputs, in their order, if they have moved")
     add("--format", choices=FORMATS, default="text", help="of tables (default: text)")
 
 
@@ -76,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _said_of_track(moments: Sequence[ExplainedMoment], track_id: int, form: str) -> list[str]:
+def _said_of_track(moments: Sequence[TrackMoment], track_id: int, form: str) -> list[str]:
     first, last = moments[0], moments[-1]
     shown = [one for one in moments if one.reported]
     lines = [f"track {track_id}: from {first.t:.3f} to {last.t:.3f} s, {_share_reported(moments, shown)}"]
@@ -90,17 +88,13 @@ def _said_of_track(moments: Sequence[ExplainedMoment], track_id: int, form: str)
     return [*lines, "", _table(rows).render(form).rstrip()]
 
 
-def _share_reported(moments: Sequence[ExplainedMoment], shown: Sequence[ExplainedMoment]) -> str:
+def _share_reported(moments: Sequence[TrackMoment], shown: Sequence[TrackMoment]) -> str:
     if not shown:
         return "never reported"
-    return (
-        "always reported"
-        if len(shown) == len(moments)
-        else f"reported at {len(shown)} of {len(moments)} steps"
-    )
+    return "always reported" if len(shown) == len(moments) else f"reported at {len(shown)} of {len(moments)} steps"
 
 
-def _table(moments: Sequence[ExplainedMoment]) -> Table:
+def _table(moments: Sequence[TrackMoment]) -> Table:
     from jeat_graph.eval.tables import Table
 
     rows: list[dict[str, Cell]] = [
@@ -117,7 +111,7 @@ def _table(moments: Sequence[ExplainedMoment]) -> Table:
     return Table.from_records(rows, title="Terms of the log odds", digits={"t": 3, "log odds": 1})
 
 
-def _said_of_place(place: ExplainedPlace, at: tuple[float, float, float], form: str) -> list[str]:
+def _said_of_place(place: Place, at: tuple[float, float, float], form: str) -> list[str]:
     from jeat_graph.eval.tables import Table
 
     t, x, y = at

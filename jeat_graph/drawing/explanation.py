@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 from jeat_graph.io.atomic import atomic_path
 
 if TYPE_CHECKING:
-    from jeat_graph.runs.explaining import ExplainedMoment
+    from jeat_graph.runs.explaining import TrackMoment
 
 # Terms that stay nearer to 0 than this are left out of the plot.
 _LEAST_TERM = 0.05
 
 
-def plot_explanation(moments: Sequence[ExplainedMoment], title: str, path: Path) -> None:
+def plot_explanation(moments: Sequence[TrackMoment], title: str, path: Path) -> None:
     """Draw the log odds of a track above their terms, and save them; the same moments give the same bytes.
 
     Args:

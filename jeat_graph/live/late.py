@@ -26,11 +26,11 @@ from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import Rewinding, ReplayableStep
 from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.rig.common_picture import CommonPicture
-from jeat_graph.tracking.checkpoint import load_state, save_state, tracker_of
+from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.first_sight import ToldSoFar
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
-from jeat_graph.tracking.model_tracker import TakenStep as StepRecord
+from jeat_graph.tracking.model_tracker import PendingStep
 from jeat_graph.tracking.tracker import Tracker
 
 REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
@@ -72,7 +72,7 @@ class LiveTracker(MetSensors):
         tracker.logs_takers = policy == REWIND
         # Where nothing is taken again: sensors of the newest scans, and what the smoothers are to know.
         self._newest = looked_last(tracker)
-        self._due: list[StepRecord | None] = []
+        self._due: list[PendingStep | None] = []
         # Of a tracker that has taken scans: to before its time nobody can go back.
         self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
         self._common = CommonPicture.of(config)
@@ -222,7 +222,7 @@ class LiveTracker(MetSensors):
         if "policy" not in state:
             raise DataError("holds a tracker, but not one that takes late scans", path)
         with refusing_damage(path):
-            live = LiveTracker(tracker_of(kept, state), state["policy"])
+            live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
             live._told.forget()
             live._newest = state["newest"]
             live.lateness.set_state(state["lateness"])

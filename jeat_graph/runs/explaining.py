@@ -21,7 +21,7 @@ from jeat_graph.tracking.tracker import Tracker
 NEAR_S = 0.15
 
 
-class ExplainedMoment(NamedTuple):
+class TrackMoment(NamedTuple):
     """One track at one step.
 
     Attributes:
@@ -78,7 +78,7 @@ class BoxThere(NamedTuple):
     taker: int
 
 
-class ExplainedPlace(NamedTuple):
+class Place(NamedTuple):
     """What is at a place at a time.
 
     Attributes:
@@ -87,10 +87,10 @@ class ExplainedPlace(NamedTuple):
     """
 
     boxes: list[BoxThere]
-    tracks: dict[int, ExplainedMoment]
+    tracks: dict[int, TrackMoment]
 
 
-class _Step(NamedTuple):
+class _ReplayedStep(NamedTuple):
     t: float
     batch: list[Scan]
     takers: list[IntArray]
@@ -98,7 +98,7 @@ class _Step(NamedTuple):
     sensors: tuple[str, ...]
 
 
-def explain_track(config: Config, detections: Detections, track_id: int) -> list[ExplainedMoment]:
+def explain_track(config: Config, detections: Detections, track_id: int) -> list[TrackMoment]:
     """Return the moments of a track, from its first box to its end.
 
     Args:
@@ -110,7 +110,7 @@ def explain_track(config: Config, detections: Detections, track_id: int) -> list
         DataError: there is no such track.
         ConfigError: the configuration's engine has no hypotheses.
     """
-    out: list[ExplainedMoment] = []
+    out: list[TrackMoment] = []
     for step in _steps(config, detections):
         row = np.flatnonzero(step.found.track_id == track_id)
         if len(row):
@@ -124,7 +124,7 @@ def explain_track(config: Config, detections: Detections, track_id: int) -> list
 
 def explain_place(
     config: Config, detections: Detections, t: float, x: float, y: float, within_s: float = NEAR_S
-) -> ExplainedPlace:
+) -> Place:
     """Return what lies at a place in the picture around a time.
 
     Args:
@@ -138,7 +138,7 @@ def explain_place(
         ConfigError: the configuration's engine has no hypotheses.
     """
     boxes: list[BoxThere] = []
-    tracks: dict[int, ExplainedMoment] = {}
+    tracks: dict[int, TrackMoment] = {}
     for step in _steps(config, detections):
         if step.t < t - within_s:
             continue
@@ -152,7 +152,7 @@ def explain_place(
         wanted |= np.isin(step.found.track_id, [one.taker for one in boxes])
         for row in np.flatnonzero(wanted):
             tracks[int(step.found.track_id[row])] = _moment(step, int(row))
-    return ExplainedPlace(boxes, tracks)
+    return Place(boxes, tracks)
 
 
 def run_to_explain(folder: Path, moved: list[str] | None = None) -> tuple[Config, Detections]:
@@ -168,7 +168,7 @@ def run_to_explain(folder: Path, moved: list[str] | None = None) -> tuple[Config
     return recorded_inputs(folder, complete_record(folder), moved)
 
 
-def _steps(config: Config, detections: Detections) -> Iterator[_Step]:
+def _steps(config: Config, detections: Detections) -> Iterator[_ReplayedStep]:
     tracker = Tracker(config)
     if not hasattr(tracker, "hypotheses"):
         raise ConfigError(f"tracker.engine={config.tracker.engine} weighs no hypotheses: nothing to explain")
@@ -176,10 +176,10 @@ def _steps(config: Config, detections: Detections) -> Iterator[_Step]:
         tracker.step(batch)
         ends = np.cumsum([len(scan) for scan in batch])[:-1]
         takers = np.split(tracker.takers(sum(map(len, batch))), ends)
-        yield _Step(batch[0].t, list(batch), takers, tracker.hypotheses(), tracker.sensor_names)
+        yield _ReplayedStep(batch[0].t, list(batch), takers, tracker.hypotheses(), tracker.sensor_names)
 
 
-def _moment(step: _Step, row: int) -> ExplainedMoment:
+def _moment(step: _ReplayedStep, row: int) -> TrackMoment:
     found, terms = step.found, step.found.terms
     named = {}
     for k, name in enumerate(step.sensors):
@@ -189,7 +189,7 @@ def _moment(step: _Step, row: int) -> ExplainedMoment:
     named["second box"] = float(terms.second_box[row])
     named["other hypotheses"] = float(terms.rest[row])
     other = int(terms.other[row])
-    return ExplainedMoment(
+    return TrackMoment(
         t=step.t,
         log_odds=float(found.log_odds[row]),
         terms=named,

@@ -23,7 +23,6 @@ from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXE
 from jeat_graph.runs.latency import late_clocks
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
-from jeat_graph.tracking.checkpoint import tracker_of
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.measured import ConfirmedMeasurements
 from jeat_graph.tracking.tracker import Tracker
@@ -79,7 +78,7 @@ class RunSteps:
         self._kept: ConfirmedMeasurements | None = None
         with refusing_damage(run.folder / RESUME):
             if saved is not None:
-                self._tracker = tracker_of(config, saved["tracker"])
+                self._tracker = Tracker.from_state(config, saved["tracker"])
                 self._done, self._rows = saved["done"], saved["counts"]
                 self._reported = set(saved["reported"].tolist())
             if options.diagnostics:

@@ -120,31 +120,18 @@ def _difference(saved: Any, wanted: Any, where: str = "") -> str:
     return f"{where} was {saved}, not {wanted}"
 
 
-def tracker_of(config: Config, state: dict[str, Any]) -> Any:
-    """Make the tracker of the engine that a state was saved by, of what its `state` returned.
-
-    Raises:
-        DataError: no tracker can be in that state.
-    """
-    from jeat_graph.tracking.tracker import Tracker
-
-    return Tracker.from_state(config, state)
-
-
-def load_tracker(path: str | Path, config: Config | None = None) -> Any:
-    """Return the tracker that was saved to a file, of whatever engine.
+def load_plain_state(path: str | Path, config: Config | None = None) -> tuple[Config, dict[str, Any]]:
+    """Read what `save_state` wrote of a tracker alone, and not of one that takes late scans.
 
     Args:
         path: the file.
-        config: the configuration that it must have had; None takes the file's.
+        config: the configuration that it must have been made with; None takes what the file says.
 
     Raises:
-        DataError: no such file, or one that holds no tracker, or one that takes late scans.
-        JeatGraphError: it was saved by another version, or with other settings.
+        DataError, JeatGraphError: as `load_state`; or it is of a tracker that takes late scans.
     """
     kept, state = load_state(path, config)
     if "policy" in state:
         # Scans that may be taken again are apart there, and identities are not those that were given out.
         raise DataError("holds a tracker that takes late scans; LiveTracker.load goes on from it", path)
-    with refusing_damage(path):
-        return tracker_of(kept, state)
+    return kept, state

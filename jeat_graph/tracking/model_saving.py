@@ -12,6 +12,7 @@ from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
+from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import StepBoxes
 
@@ -84,10 +85,11 @@ class SavedModel:
     @classmethod
     def load(cls, path: str | Path, config: Config | None = None) -> Self:
         """Return the tracker that was saved to a file; see `Tracker.load`."""
-        from jeat_graph.tracking.checkpoint import load_tracker
+        from jeat_graph.tracking.checkpoint import load_plain_state
 
-        made: Self = load_tracker(path, config)
-        return made
+        kept, state = load_plain_state(path, config)
+        with refusing_damage(path):
+            return cls.from_state(kept, state)
 
     def state(self, snapshot: ModelSnapshot | None = None) -> dict[str, Any]:
         """Return what `from_state` takes: the state now, or at a snapshot, with the smoother's of now.

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.reference_model import ModelRows
 
+#: Sensors of which all combinations are listed beforehand.
+_MOST_LISTED = 8
 _MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
 
 
@@ -31,24 +34,41 @@ def in_order(rows: ModelRows) -> ModelRows:
     )
 
 
+class ClassNames(NamedTuple):
+    """The classes of a table.
+
+    Attributes:
+        names: by number, as the model has them.
+        numbers: that they have for users, by name.
+    """
+
+    names: Sequence[str]
+    numbers: dict[str, int]
+
+
 def table_of(
-    rows: ModelRows, sensors: tuple[str, ...], places: IntArray, names: Sequence[str] | None
+    rows: ModelRows,
+    sensors: tuple[str, ...],
+    places: Places,
+    called: ClassNames | None,
+    instants: FloatArray | None = None,
 ) -> Trajectories:
     """Return rows as a table.
 
     Args:
         rows: of the model.
         sensors: names of the sensors of the table.
-        places: (S,) where the model's sensors stand among these.
-        names: of the classes, by number; None for a table without classes.
+        places: where the model's sensors stand among these.
+        called: the classes; None for a table without any.
+        instants: at which there was a table, be it of no row (s).
     """
     t, ids, mean, variance, real, used, label, share = rows
     state, spread = mean.reshape(-1, 2, singer.STATES), variance.reshape(-1, 2, singer.STATES)
     sides, size = box_sides.corners(state), singer.box_size(state)
     classes = None
-    if names is not None:
+    if called is not None:
         # The last one is for those below 0.
-        classes = np.array([*names, ""], dtype=np.str_)[label], np.where(label >= 0, share, np.nan)
+        classes = np.array([*called.names, ""], dtype=np.str_)[label], np.where(label >= 0, share, np.nan)
     return Trajectories(
         t=t,
         track_id=ids,
@@ -56,22 +76,40 @@ def table_of(
         existence=real,
         mean=state[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
         var=spread[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
-        used=_moved(used, places),
+        used=places.bits(used),
         sensors=sensors,
         classes=None if classes is None else classes[0],
         class_probability=None if classes is None else classes[1],
         size_var=size**2 * spread[:, :, singer.LOG_SIZE],
+        instants=instants,
+        class_ids=(called.numbers or None) if called is not None else None,
     )
 
 
-def _moved(used: IntArray, places: IntArray) -> IntArray:
-    """Return the bits of sensors (N,) at other places."""
-    if np.array_equal(places, np.arange(len(places))):
-        return used
-    out = np.zeros_like(used)
-    for k, place in enumerate(places.tolist()):
-        out |= (used >> k & 1) << place
-    return out
+class Places:
+    """Where the sensors of the model stand among those of a table, for the bits of `used`.
+
+    Args:
+        at: (S,) places.
+    """
+
+    def __init__(self, at: Sequence[int]) -> None:
+        self.at = np.array(at, dtype=np.int64)
+        self._same = list(at) == list(range(len(at)))
+        few = len(at) <= _MOST_LISTED
+        self._listed = self._one_by_one(np.arange(1 << len(at), dtype=np.int64)) if few else None
+
+    def bits(self, used: IntArray) -> IntArray:
+        """Return the bits of sensors (N,) at their places in the table."""
+        if self._same:
+            return used
+        return self._one_by_one(used) if self._listed is None else self._listed[used]
+
+    def _one_by_one(self, used: IntArray) -> IntArray:
+        out = np.zeros_like(used)
+        for k, place in enumerate(self.at.tolist()):
+            out |= (used >> k & 1) << place
+        return out
 
 
 def with_classes(rows: ModelRows, tally: ClassTally | None, names: Sequence[str]) -> ModelRows:

@@ -19,6 +19,7 @@ from jeat_graph.core import _core
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
+from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
 from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
@@ -33,7 +34,7 @@ from jeat_graph.tracking.hypotheses import Hypotheses, hypotheses_of
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import StepBoxes, diagnostics_of, records_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
-from jeat_graph.tracking.model_tables import in_order, table_of, with_classes
+from jeat_graph.tracking.model_tables import ClassNames, Places, in_order, table_of, with_classes
 from jeat_graph.tracking.prediction import Prediction, of_motion, predicted, still_there
 from jeat_graph.tracking.reference_model import ModelRows, ReferenceModel
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
@@ -47,7 +48,7 @@ _MOST_ALIKE = 6.0
 _FINISHED = "this tracker has been finished; make another one for another recording"
 
 
-class TakenStep(NamedTuple):
+class PendingStep(NamedTuple):
     """A step that the smoothers are to be told of when nothing can come before it any more.
 
     Attributes:
@@ -98,7 +99,9 @@ class ModelTracker(Updates, SavedModel):
             config = replace(config, tracker=replace(config.tracker, engine=engine))
         self.config = config
         self.constants = constants or ModelConstants()
+        self.sensor_names: tuple[str, ...] = config.sensor_names
         self._looked: tuple[str, ...] = ()  # names of the sensors as the model counts them
+        self._places = Places(())  # where these stand among all
         self.logs_takers = True
         self._diagnostics = diagnostics
         self._smooths = config.smoother.engine != "none"
@@ -117,11 +120,6 @@ class ModelTracker(Updates, SavedModel):
         self._order: IntArray = np.zeros(0, dtype=np.int64)
         self._boxes = StepBoxes.none()
         self._finished = False
-
-    @property
-    def sensor_names(self) -> tuple[str, ...]:
-        """Names of the sensors, declared or met, in alphabetical order."""
-        return self.config.sensor_names
 
     @property
     def num_tracks(self) -> int:
@@ -174,7 +172,7 @@ class ModelTracker(Updates, SavedModel):
             self._model.hand_over(None, None, *self._called_now())
         return self.causal()
 
-    def take_in(self, batch: Sequence[Scan]) -> TakenStep | None:
+    def take_in(self, batch: Sequence[Scan]) -> PendingStep | None:
         """Do a step for a caller who may have to take it back, and hands it to the smoothers later.
 
         Args:
@@ -191,7 +189,7 @@ class ModelTracker(Updates, SavedModel):
         self._take_in(batch)
         if not self._smooths:
             return None
-        return TakenStep(self._model.record(), self._model.living(), *self._called_now())
+        return PendingStep(self._model.record(), self._model.living(), *self._called_now())
 
     def _take_in(self, batch: Sequence[Scan]) -> None:
         if self._finished:
@@ -200,7 +198,8 @@ class ModelTracker(Updates, SavedModel):
         if now is not None and t < now:
             raise TimeOrderError(f"scan at t = {t} s is older than the last one at {now} s")
         check_names(self._classes, batch)
-        embeddings = embeddings_of(self._looks, batch)
+        seen = any(scan.embeddings is not None for scan in batch)
+        embeddings = embeddings_of(self._looks, batch) if seen else None
         self._watch.look(batch)  # before anything changes: a user may have made warnings errors
         self._declare(batch)
         # Several scans of one sensor at one time are one.
@@ -223,7 +222,7 @@ class ModelTracker(Updates, SavedModel):
             detection = np.arange(len(order), dtype=np.int64)
             self._looks = remember(compared, self.takers(len(order)), detection, self._model.identities())
 
-    def hand_over(self, taken: TakenStep | None) -> None:
+    def hand_over(self, taken: PendingStep | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
         if taken is not None:
             self._model.hand_over(taken.record, taken.given, taken.label, taken.share)
@@ -238,6 +237,7 @@ class ModelTracker(Updates, SavedModel):
         """Go back to a snapshot of this tracker."""
         moment, self._looked, self._classes, self._looks, self._order, self._boxes = snapshot
         self._model.restore(moment)
+        self._find_places()
         self._causal = None
 
     def begin_anew(self, t: float) -> None:
@@ -267,7 +267,7 @@ class ModelTracker(Updates, SavedModel):
     def last_looks(self) -> dict[str, float]:
         """Return when each declared sensor looked last (s), minus infinity for never."""
         looks = np.nan_to_num(self._model.last_looks(), nan=-math.inf, neginf=-math.inf)
-        never = dict.fromkeys(self.config.sensor_names, -math.inf)
+        never = dict.fromkeys(self.sensor_names, -math.inf)
         return never | dict(zip(self._looked, looks.tolist(), strict=True))
 
     def meet(self, scans: Sequence[Scan]) -> None:
@@ -281,17 +281,18 @@ class ModelTracker(Updates, SavedModel):
             return
         config = wider(self.config, (scan.sensor for scan in scans))
         if config is not None:
-            self.config = config
+            self.config, self.sensor_names = config, config.sensor_names
             self._watch.know(config)
+            self._find_places()
         for scan in scans:
-            sensor_index(scan.sensor, self.config.sensor_names)
+            sensor_index(scan.sensor, self.sensor_names)
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did."""
         if self._causal is None:
-            at = None if self.time is None else np.array([self.time])
-            table = self._table(with_classes(self._model.rows(), self._classes, self._called))
-            self._causal = replace(table, instants=at, class_ids=self._class_ids or None)
+            now = self.time
+            at = None if now is None else np.array([now])
+            self._causal = self._table(with_classes(self._model.rows(), self._classes, self._called), at)
         return self._causal
 
     def predict(self, t: float) -> Prediction:
@@ -312,7 +313,6 @@ class ModelTracker(Updates, SavedModel):
         rows, covariance = predicted(rows, self._model.covariances(), t, q, self.constants)
         there = still_there(rows, self._model.picture())
         table = self._table(rows).take(there)
-        table = replace(table, class_ids=self._class_ids or None)
         return Prediction(**vars(table), cov=of_motion(covariance[there]))
 
     def last_updates(self) -> Diagnostics:
@@ -323,7 +323,7 @@ class ModelTracker(Updates, SavedModel):
         """
         self._check_diagnostics()
         model = self._model
-        told = self._boxes._replace(sensor=self._places()[self._boxes.sensor])
+        told = self._boxes._replace(sensor=self._places.at[self._boxes.sensor])
         return diagnostics_of(told, model.takers(), model.living(), model.fit(), self.sensor_names)
 
     def last_measurements(self) -> tuple[RecordArray, IntArray, BoolArray]:
@@ -336,7 +336,7 @@ class ModelTracker(Updates, SavedModel):
             JeatGraphError: the tracker was not made with `diagnostics`.
         """
         self._check_diagnostics()
-        told = self._boxes._replace(sensor=self._places()[self._boxes.sensor])
+        told = self._boxes._replace(sensor=self._places.at[self._boxes.sensor])
         q, fit = singer.ProcessNoise(*self._model.learnt()["process_noise"]), self._model.fit()
         rows = records_of(told, self._model.takers(), fit, q, self.constants)
         return rows, self._model.living(), fit[2] > self.constants.report
@@ -419,7 +419,7 @@ class ModelTracker(Updates, SavedModel):
 
     def _declare(self, batch: Sequence[Scan]) -> None:
         """Make the sensors known that look for the first time."""
-        new = sorted({scan.sensor for scan in batch} - set(self._looked))
+        new = sorted({scan.sensor for scan in batch if scan.sensor not in self._looked})
         if len(self._looked) + len(new) > _MOST_SENSORS:
             raise DataError(f"at most {_MOST_SENSORS} sensors can be tracked together")
         for name in new:
@@ -427,8 +427,10 @@ class ModelTracker(Updates, SavedModel):
             even = math.nan if said.even_score is None else float(logit(np.array(said.even_score)))
             self._model.declare_sensor(even, said.kind == "event")
             self._looked = (*self._looked, name)
+        if new:
+            self._find_places()
 
-    def _compare(self, embeddings: FloatArray, sensor: IntArray) -> Compared:
+    def _compare(self, embeddings: EmbeddingArray, sensor: IntArray) -> Compared:
         """Compare the embeddings (M, E) of a step's detections with the living tracks."""
         looks, number = self._looks, len(self._looked)
         looks = looks.among(number) if looks is not None else Looks.start(number, embeddings.shape[1])
@@ -436,10 +438,10 @@ class ModelTracker(Updates, SavedModel):
 
     def _count_classes(self, batch: Sequence[Scan]) -> None:
         """Let the boxes of a step vote for the classes of their tracks."""
+        if self._classes is None and all(scan.classes is None for scan in batch):
+            return
         self._class_ids = number_classes(self._class_ids, batch)
         votes = Votes.of_batch(batch, np.arange(len(self._order), dtype=np.int64))
-        if votes is None and self._classes is None:
-            return
         tally = self._classes or ClassTally.start()
         self._classes = tally.after(self._model.living(), self.takers(len(self._order)), votes)
         self._called += [name for name in self._classes.names.tolist() if name not in self._called]
@@ -455,15 +457,13 @@ class ModelTracker(Updates, SavedModel):
 
     def _smoothed_table(self, rows: ModelRows) -> Trajectories:
         """Return rows of the smoother in order of time, then of identity."""
-        table = self._table(in_order(rows))
-        return replace(table, class_ids=self._class_ids) if self._class_ids else table
+        return self._table(in_order(rows))
 
-    def _table(self, rows: ModelRows) -> Trajectories:
+    def _table(self, rows: ModelRows, instants: FloatArray | None = None) -> Trajectories:
         """Return rows as a table, whose sensors are those of the configuration."""
-        names = None if self._classes is None else self._called
-        return table_of(rows, self.sensor_names, self._places(), names)
+        names = None if self._classes is None else ClassNames(self._called, self._class_ids)
+        return table_of(rows, self.sensor_names, self._places, names, instants)
 
-    def _places(self) -> IntArray:
-        """Return where the model's sensors (S,) stand among all names."""
-        names = self.config.sensor_names
-        return np.array([names.index(name) for name in self._looked], dtype=np.int64)
+    def _find_places(self) -> None:
+        """Find out where the model's sensors stand among all."""
+        self._places = Places([self.sensor_names.index(name) for name in self._looked])

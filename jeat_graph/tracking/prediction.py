@@ -48,8 +48,8 @@ def predicted(
         model = singer.discretise(dt, c)
         F = singer.in_perspective(model.F, mean, dt, c)
         mean, covariance = singer.predict(mean, covariance, model, F, q, c)
-    variance = np.diagonal(covariance, axis1=2, axis2=3).reshape(len(mean), -1)
-    flat = mean.reshape(len(mean), -1)
+    variance = np.diagonal(covariance, axis1=2, axis2=3).reshape(-1, 2 * singer.STATES)
+    flat = mean.reshape(-1, 2 * singer.STATES)
     _, ids, _, _, real, used, label, share = rows
     return (np.full(len(mean), t), ids, flat, variance, real, 0 * used, label, share), covariance
 

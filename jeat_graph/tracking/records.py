@@ -18,7 +18,7 @@ from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.filtered_track import FilteredTrack, tracks_of
 from jeat_graph.smoothers.state_rts import FilterRecord
 from jeat_graph.tracking.measured import ConfirmedMeasurements
-from jeat_graph.tracking.model_tracker import TakenStep
+from jeat_graph.tracking.model_tracker import PendingStep
 from jeat_graph.tracking.tracker import Tracker
 
 
@@ -90,7 +90,7 @@ def _batches(detections: Detections, progress: bool) -> Iterator[list[Scan]]:
             bar.update(len(batch))
 
 
-def _records(taken: TakenStep, born: int) -> Iterator[tuple[FilterRecord, IntArray]]:
+def _records(taken: PendingStep, born: int) -> Iterator[tuple[FilterRecord, IntArray]]:
     """Yield the records of a step's scans, each with the index (N,) of the sensor whose box each track took.
 
     Their transitions are still to be filled in. `born` tracks had been born before the step.

@@ -11,7 +11,6 @@ from jeat_graph import Tracker, load_config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.appearance import Looks, compare, remember
-from jeat_graph.tracking.update_log import allocate_log
 
 NUMBERS = 32
 
@@ -139,11 +138,7 @@ def test_the_ratio_is_that_of_two_normal_distributions():
         exact = found.astype(np.float64)
         order = rng.permutation(3)
         compared = compare(looks.of(living), found[order], sensor, 50.0)
-        log = allocate_log(3)
-        log.count[0] = 3
-        log.rows["track_id"][:] = living[order]
-        log.detection[:] = np.arange(3)
-        looks = remember(compared, log, living)
+        looks = remember(compared, living[order], np.arange(3), living)
         s = step % 2
         seen = [k for k in range(3) if (s, k) in memory]
         for j in order.tolist():

@@ -109,9 +109,14 @@ private:
                     relax(place_[rows + pair.column], -pair.gain, k);
                 }
                 relax(m + row, 0.0, end);
+                // Of equally near ones a free column ends the search: many boxes at one place cost no more for it.
                 std::size_t best = width;
                 for (const std::size_t column : touched_) {
-                    if (!done_[column] && (best == width || distance_[column] < distance_[best])) best = column;
+                    if (done_[column]) continue;
+                    const bool nearer = best == width || distance_[column] < distance_[best];
+                    const bool ends = best < width && distance_[column] == distance_[best] &&
+                                      column_row_[column] == n && column_row_[best] != n;
+                    if (nearer || ends) best = column;
                 }
                 reached = distance_[best];
                 done_[best] = 1;

@@ -54,6 +54,24 @@ struct Rows {
     }
 };
 
+// The upper triangles of both axes' covariances, which are symmetric to the last bit.
+inline constexpr int kHalf = kStates * (kStates + 1) / 2;
+using Halves = std::array<double, 2 * kHalf>;
+
+inline void halve(const double* covariance, Halves& out) {
+    std::size_t to = 0;
+    for (int axis = 0; axis < 2; ++axis)
+        for (int i = 0; i < kStates; ++i)
+            for (int j = i; j < kStates; ++j) out[to++] = covariance[axis * kMatrix + i * kStates + j];
+}
+inline void unfold(const Halves& halves, double* out) {
+    std::size_t from = 0;
+    for (int axis = 0; axis < 2; ++axis)
+        for (int i = 0; i < kStates; ++i)
+            for (int j = i; j < kStates; ++j, ++from)
+                out[axis * kMatrix + i * kStates + j] = out[axis * kMatrix + j * kStates + i] = halves[from];
+}
+
 // One update of one track.
 struct Entry {
     double t, dt;       // time, and since the last update (s)
@@ -61,7 +79,7 @@ struct Entry {
     std::int64_t used = 0;
     bool last_of_step = false;
     std::array<double, kMean> predicted_mean, mean;
-    std::array<double, kCovariance> predicted_covariance, covariance;
+    Halves predicted_covariance, covariance;
 };
 
 // What the filter did in one step. It is kept apart until no step can come before this one any more.
@@ -176,15 +194,17 @@ private:
         mean_.resize(n);
         covariance_.resize(n);
         mean_[n - 1] = entries[n - 1].mean;
-        covariance_[n - 1] = entries[n - 1].covariance;
+        unfold(entries[n - 1].covariance, covariance_[n - 1].data());
+        std::array<double, kCovariance> predicted;
         for (std::size_t k = n - 1; k-- > 0;) {
             const Entry &now = entries[k], &later = entries[k + 1];
             mean_[k] = now.mean;
-            covariance_[k] = now.covariance;
+            unfold(now.covariance, covariance_[k].data());
+            unfold(later.predicted_covariance, predicted.data());
             const Matrix F = filters::in_perspective(transition(later.dt, c), now.mean.data(), later.dt, c);
             for (int axis = 0; axis < 2; ++axis) {
                 const int m = axis * kStates, p = axis * kMatrix;
-                rts_axis(&mean_[k][m], &covariance_[k][p], F, &later.predicted_mean[m], &later.predicted_covariance[p],
+                rts_axis(&mean_[k][m], &covariance_[k][p], F, &later.predicted_mean[m], &predicted[p],
                          &mean_[k + 1][m], &covariance_[k + 1][p]);
             }
         }

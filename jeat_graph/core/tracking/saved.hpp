@@ -232,12 +232,18 @@ template <class Visitor> void visit_answer(Visitor& v, Answer& answer) {
     v.column("answer.noise_scale", noise_scale, boxes, 1);
 }
 
+inline constexpr std::size_t kWide = 2 * smoothers::kHalf;
+
 // The entries of all histories in columns.
 struct EntryColumns {
     std::vector<double> t, dt, real, predicted_mean, mean, predicted_covariance, covariance;
     std::vector<std::int64_t> used;
     std::vector<std::uint8_t> last_of_step;
 
+    void reserve(std::size_t entries) {
+        for (auto* one : {&predicted_mean, &mean}) one->reserve(entries * kMean);
+        for (auto* one : {&predicted_covariance, &covariance}) one->reserve(entries * kWide);
+    }
     void add(Entry& entry) {
         auto& [at, since, posterior, sensors, last, m0, m1, p0, p1] = entry;
         t.push_back(at), dt.push_back(since), real.push_back(posterior);
@@ -253,8 +259,8 @@ struct EntryColumns {
         entry.used = used[k], entry.last_of_step = last_of_step[k];
         std::copy_n(&predicted_mean[k * kMean], kMean, entry.predicted_mean.begin());
         std::copy_n(&mean[k * kMean], kMean, entry.mean.begin());
-        std::copy_n(&predicted_covariance[k * kCovariance], kCovariance, entry.predicted_covariance.begin());
-        std::copy_n(&covariance[k * kCovariance], kCovariance, entry.covariance.begin());
+        std::copy_n(&predicted_covariance[k * kWide], kWide, entry.predicted_covariance.begin());
+        std::copy_n(&covariance[k * kWide], kWide, entry.covariance.begin());
         return entry;
     }
 };
@@ -264,6 +270,9 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     std::vector<std::int64_t> track_id, given, label, counts;
     std::vector<double> share, last_seen;
     EntryColumns columns;
+    std::size_t expected = 0;
+    for (const History& history : living) expected += history.entries.size();
+    columns.reserve(expected);
     for (History& history : living) {
         auto& [id, called, seen, entries] = history;
         track_id.push_back(id), given.push_back(called.track_id), label.push_back(called.label);
@@ -287,8 +296,8 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     v.column("histories.last_of_step", columns.last_of_step, total, 1);
     v.column("histories.predicted_mean", columns.predicted_mean, total, kMean);
     v.column("histories.mean", columns.mean, total, kMean);
-    v.column("histories.predicted_covariance", columns.predicted_covariance, total, kCovariance);
-    v.column("histories.covariance", columns.covariance, total, kCovariance);
+    v.column("histories.predicted_covariance", columns.predicted_covariance, total, kWide);
+    v.column("histories.covariance", columns.covariance, total, kWide);
     visit_rows(v, "final.", histories.rows());
     if constexpr (std::is_same_v<Visitor, StateReader>) {
         living.assign(tracks, {});
@@ -366,13 +375,16 @@ inline void check_histories(Histories& histories, const State& state, bool smoot
     bool fits = living.empty() || (smooths && living.size() == state.tracks.size());
     for (std::size_t i = 0; fits && i < living.size(); ++i) fits = living[i].track_id == state.tracks.track_id[i];
     StateReader::require(fits, "histories.track_id", "are not those of the tracks");
+    std::array<double, kCovariance> before, after;
     for (const History& history : living)
-        for (const Entry& entry : history.entries)
+        for (const Entry& entry : history.entries) {
+            smoothers::unfold(entry.predicted_covariance, before.data());
+            smoothers::unfold(entry.covariance, after.data());
             for (int axis = 0; axis < 2; ++axis)
-                StateReader::require(is_covariance(&entry.covariance[axis * kMatrix]) &&
-                                         is_covariance(&entry.predicted_covariance[axis * kMatrix]) &&
+                StateReader::require(is_covariance(&before[axis * kMatrix]) && is_covariance(&after[axis * kMatrix]) &&
                                          std::abs(entry.mean[axis * kStates + kLogSize]) <= kMostLogSize,
                                      "histories", "hold what is no state");
+        }
 }
 
 }  // namespace jeat::tracking

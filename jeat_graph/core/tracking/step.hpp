@@ -456,14 +456,14 @@ private:
         for (std::size_t i = before; i < tracks.size(); ++i) begin_entry(entries[i], i, 0.0);
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             std::copy_n(tracks.mean_of(i), kMean, entries[i].mean.begin());
-            std::copy_n(tracks.covariance_of(i), kCovariance, entries[i].covariance.begin());
+            smoothers::halve(tracks.covariance_of(i), entries[i].covariance);
         }
     }
     void begin_entry(smoothers::Entry& entry, std::size_t row, double dt) {
         entry.t = s_.t;
         entry.dt = dt;
         std::copy_n(s_.tracks.mean_of(row), kMean, entry.predicted_mean.begin());
-        std::copy_n(s_.tracks.covariance_of(row), kCovariance, entry.predicted_covariance.begin());
+        smoothers::halve(s_.tracks.covariance_of(row), entry.predicted_covariance);
     }
 
     // Whether a sensor that sees changes alone says nothing of a track: it stands still.
