@@ -15,7 +15,7 @@ from jeat_graph.eval.tables import FORMATS
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.runs.explaining import TrackMoment, ExplainedPlace
+    from jeat_graph.runs.explaining import TrackMoment, PlaceStory
 
 WRITES = ("out",)
 HELP = "say why something in a run is a track, or is not: the terms of its log odds over time"
@@ -111,7 +111,7 @@ def _table(moments: Sequence[TrackMoment]) -> Table:
     return Table.from_records(rows, title="Terms of the log odds", digits={"t": 3, "log odds": 1})
 
 
-def _said_of_place(place: ExplainedPlace, at: tuple[float, float, float], form: str) -> list[str]:
+def _said_of_place(place: PlaceStory, at: tuple[float, float, float], form: str) -> list[str]:
     from jeat_graph.eval.tables import Table
 
     t, x, y = at

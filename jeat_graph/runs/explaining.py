@@ -78,7 +78,7 @@ class BoxThere(NamedTuple):
     taker: int
 
 
-class ExplainedPlace(NamedTuple):
+class PlaceStory(NamedTuple):
     """What is at a place at a time.
 
     Attributes:
@@ -124,7 +124,7 @@ def explain_track(config: Config, detections: Detections, track_id: int) -> list
 
 def explain_place(
     config: Config, detections: Detections, t: float, x: float, y: float, within_s: float = NEAR_S
-) -> ExplainedPlace:
+) -> PlaceStory:
     """Return what lies at a place in the picture around a time.
 
     Args:
@@ -152,7 +152,7 @@ def explain_place(
         wanted |= np.isin(step.found.track_id, [one.taker for one in boxes])
         for row in np.flatnonzero(wanted):
             tracks[int(step.found.track_id[row])] = _moment(step, int(row))
-    return ExplainedPlace(boxes, tracks)
+    return PlaceStory(boxes, tracks)
 
 
 def run_to_explain(folder: Path, moved: list[str] | None = None) -> tuple[Config, Detections]:

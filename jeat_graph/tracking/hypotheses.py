@@ -52,12 +52,10 @@ def hypotheses_of(
         t: time of the last step (s).
         shown: (R,) identities of the tracks that are reported.
     """
-    sensors = len(np.asarray(learnt["p_detect"]).reshape(-1))
+    sensors = len(learnt["p_detect"])
     evidence = Evidence(
         **{
-            f.name: np.asarray(columns[f.name]).reshape(
-                (-1, sensors) if f.name in Evidence.PER_SENSOR else -1
-            )
+            f.name: np.asarray(columns[f.name]).reshape((-1, sensors) if f.name in Evidence.PER_SENSOR else -1)
             for f in fields(Evidence)
         }
     )

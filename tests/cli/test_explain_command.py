@@ -47,7 +47,7 @@ def test_a_place_tells_boxes_and_their_tracks(folder, capsys):
     text = explained(folder, capsys, "--at", "1.0,920,230")
     assert "3 boxes of sensors, 1 tracks" in text
     assert "0.12" in text
-    assert "track 2, existence 0.0" in text
+    assert "track 2, existence 0." in text
 
 
 def test_a_place_where_nothing_is(folder, capsys):

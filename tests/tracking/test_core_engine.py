@@ -161,8 +161,8 @@ def moving(times=200, period=0.05):
 
 
 def test_rows_with_a_lag_are_final_when_they_are_given_and_near_those_of_whole_tracks():
-    config = load_config("core", ["smoother.lag_s=1"])
-    whole = Tracker(load_config("core", ["smoother.engine=rts"]), image=(1280, 720))
+    config = load_config("default", ["smoother.lag_s=1"])
+    whole = Tracker(load_config("default", ["smoother.engine=rts"]), image=(1280, 720))
     live, parts = Tracker(config, image=(1280, 720)), []
     for scan in moving():
         live.step(scan)
@@ -181,7 +181,7 @@ def test_rows_with_a_lag_are_final_when_they_are_given_and_near_those_of_whole_t
 
 
 def test_memory_of_a_fixed_lag_does_not_grow_with_time():
-    live = Tracker(load_config("core", ["smoother.lag_s=.5"]), image=(1280, 720))
+    live = Tracker(load_config("default", ["smoother.lag_s=.5"]), image=(1280, 720))
     sizes = []
     for scan in moving(600):
         live.step(scan)
@@ -191,26 +191,26 @@ def test_memory_of_a_fixed_lag_does_not_grow_with_time():
 
 
 def test_the_configuration_chooses_the_engine_and_whoever_makes_the_tracker_has_the_last_word():
-    assert isinstance(Tracker("core"), ModelTracker)
-    assert isinstance(Tracker(load_config("default", ["tracker.engine=reference"])), ModelTracker)
-    assert not isinstance(Tracker("core", engine="compiled"), ModelTracker)
+    assert isinstance(Tracker(), ModelTracker)
+    assert Tracker(load_config("default", ["tracker.engine=reference"])).config.tracker.engine == "reference"
+    assert Tracker("default", engine="reference").config.tracker.engine == "reference"
+    assert not isinstance(Tracker("paper"), ModelTracker)
 
 
 def test_constants_are_taken_by_name():
     doubled = replace(ModelConstants(), report=0.999)
-    careful = ModelTracker("core", constants=doubled, image=(1280, 720))
-    usual = ModelTracker("core", image=(1280, 720))
+    careful = ModelTracker("default", constants=doubled, image=(1280, 720))
+    usual = ModelTracker("default", image=(1280, 720))
     rows = [sum(len(made.step(scan)) for scan in moving(10)) for made in (careful, usual)]
     assert rows[0] < rows[1]
 
 
-def test_commands_track_with_it_and_say_nothing_of_a_compiler(tmp_path, capsys):
+def test_commands_track_with_it(tmp_path):
     rows = [f"{t},{s},{x},{y},{w},{h},.9" for t, s, boxes, _ in moving(40) for x, y, w, h in boxes]
     source = tmp_path / "detections.csv"
     source.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
     out = tmp_path / "run"
-    assert main(["track", str(source), "--config", "core", "--image", "1280x720", "--out", str(out)]) == 0
-    assert "compile" not in capsys.readouterr().err
+    assert main(["track", str(source), "--image", "1280x720", "--out", str(out)]) == 0
     learnt = json.loads((out / "run.json").read_text())["learnt"]["cam"]
     assert learnt["p_detect"] > 0.9
     assert {path.name for path in out.iterdir()} >= {"causal.csv", "smoothed.csv"}
@@ -219,21 +219,17 @@ def test_commands_track_with_it_and_say_nothing_of_a_compiler(tmp_path, capsys):
 def test_the_reference_is_not_saved_and_says_so_in_one_line(tmp_path, capsys):
     source = tmp_path / "detections.csv"
     source.write_text("t,sensor,left,top,width,height,score\n0,cam,1,2,30,40,.9\n.1,cam,1,2,30,40,.9\n")
-    how = ["--config", "core", "--set", "tracker.engine=reference", "--image", "1280x720"]
+    how = ["--set", "tracker.engine=reference", "--image", "1280x720"]
     assert main(["track", str(source), *how, "--out", str(tmp_path / "run"), "--resume"]) == 2
     assert "tracker.engine" in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_batch_tracks_with_it_and_calibrate_says_that_there_is_nothing_to_calibrate(tmp_path, capsys):
+def test_batch_tracks_with_it(tmp_path):
     rows = [f"{t},{s},{x},{y},{w},{h},.9" for t, s, boxes, _ in moving(20) for x, y, w, h in boxes]
     source = tmp_path / "detections.csv"
     source.write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
     manifest = tmp_path / "manifest.csv"
     manifest.write_text(f"name,detections\none,{source}\n")
-    how = ["--config", "core", "--image", "1280x720"]
+    how = ["--image", "1280x720"]
     assert main(["batch", str(manifest), *how, "--out", str(tmp_path / "runs")]) == 0
     assert (tmp_path / "runs" / "runs" / "one" / "causal.csv").is_file()
-    capsys.readouterr()
-    assert main(["calibrate", str(source), *how, "--out", str(tmp_path / "found.yaml")]) == 2
-    assert "nothing to calibrate" in capsys.readouterr().err.splitlines()[-1]
-    assert not (tmp_path / "found.yaml").exists()
