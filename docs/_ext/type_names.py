@@ -1,4 +1,4 @@
-"""Types in the API pages by the names that they have in the code, not as Sphinx writes its references to them."""
+"""Types in the API pages by the names that they have in the code, not as references of Sphinx."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _EARLIER = 400
 
 
 def _rename(app: Sphinx, *_: Any) -> None:
-    for annotations in app.env.current_document.autodoc_annotations.values():
-        for name, text in annotations.items():
-            annotations[name] = _REFERENCE.sub(r"\1", text)
+    for types in app.env.current_document.autodoc_annotations.values():
+        for name, text in types.items():
+            types[name] = _REFERENCE.sub(r"\1", text)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:

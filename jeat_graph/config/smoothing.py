@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from jeat_graph.config.fields import Section, choice, flag, number
+from jeat_graph.config.fields import Section, choice, number
 
 ENGINES = ("fixed-lag", "fixed-lag-rts", "full", "rts", "none")
 

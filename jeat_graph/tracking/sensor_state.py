@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-
 class SensorState(NamedTuple):
     """Running estimates of one sensor.
 

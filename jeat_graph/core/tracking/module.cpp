@@ -1,4 +1,5 @@
 // Binds the tracker's step.
+#include <array>
 #include <optional>
 
 #include <nanobind/stl/optional.h>
@@ -33,12 +34,14 @@ using Scans = std::tuple<Out<std::int64_t>, Out<std::int64_t>, Out2<double>, Out
 
 Scans scans_of(const Record& record) {
     std::vector<double> predicted, predicted_covariance, mean, covariance;
+    std::array<double, kCovariance> whole;
     for (const smoothers::Entry& entry : record.entries) {
         predicted.insert(predicted.end(), entry.predicted_mean.begin(), entry.predicted_mean.end());
-        predicted_covariance.insert(predicted_covariance.end(), entry.predicted_covariance.begin(),
-                                    entry.predicted_covariance.end());
+        smoothers::unfold(entry.predicted_covariance, whole.data());
+        predicted_covariance.insert(predicted_covariance.end(), whole.begin(), whole.end());
         mean.insert(mean.end(), entry.mean.begin(), entry.mean.end());
-        covariance.insert(covariance.end(), entry.covariance.begin(), entry.covariance.end());
+        smoothers::unfold(entry.covariance, whole.data());
+        covariance.insert(covariance.end(), whole.begin(), whole.end());
     }
     const std::vector<std::int64_t> sensors(record.sensors.begin(), record.sensors.end());
     const std::vector<std::int64_t> tracks(record.tracks.begin(), record.tracks.end());
