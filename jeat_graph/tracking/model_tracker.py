@@ -44,7 +44,7 @@ from jeat_graph.tracking.updates import Updates
 #: Most sensors: the columns of `Trajectories.used` are the bits of a signed number.
 _MOST_SENSORS = 63
 #: Greatest absolute value of ln of what looks say of a pair.
-_MOST_ALIKE = 6.0
+_MOST_ALIKE = 4.0
 _FINISHED = "this tracker has been finished; make another one for another recording"
 
 
