@@ -19,9 +19,10 @@ _SENSOR = "rgb"
 _NO_BOUND = 1e9
 _ABOUT_SETTINGS = """# Configuration
 
-Every setting, made from the schema in `jeat_graph/config`, with its value in the two presets. A command takes
-the preset `default` unless `--config` names another one. Write a setting as `section.name=value` with `--set`,
-or as a tree in a YAML file for `--config`; `base: NAME` in that file takes all other settings from a preset.
+Every setting, made from the schema in `jeat_graph/config`, with its value in the two presets. A command
+takes the preset `default` unless `--config` names another one. Write a setting as `section.name=value` with
+`--set`, or as a tree in a YAML file for `--config`; `base: NAME` in that file takes all other settings from
+a preset.
 
 `default` declares no sensors: any name works, and the tracker learns what it needs about a sensor while it
 runs. The constants of its model are not settings; they stand in `filters/model_constants.py`, each with its
@@ -87,7 +88,7 @@ def configuration_page() -> str:
         title, note = f.name, ""
         if section is not kind:
             title = f"{f.name}.NAME"
-            note = f" A sensor that is not declared has the values under `default`; `paper` declares `{_SENSOR}`."
+            note = f" Sensors that are not declared have the values of `default`; `paper` declares `{_SENSOR}`."
             values = [value.get(_SENSOR, section()) for value in values]
         about = _about(section)
         head = f"| setting | meaning | {' | '.join(f'`{name}`' for name in _PRESETS)} | unit | range |"
