@@ -88,7 +88,7 @@ def configuration_page() -> str:
         title, note = f.name, ""
         if section is not kind:
             title = f"{f.name}.NAME"
-            note = f" Sensors that are not declared have the values of `default`; `paper` declares `{_SENSOR}`."
+            note = f" Sensors that nobody declares have the values of `default`; `paper` has `{_SENSOR}`."
             values = [value.get(_SENSOR, section()) for value in values]
         about = _about(section)
         head = f"| setting | meaning | {' | '.join(f'`{name}`' for name in _PRESETS)} | unit | range |"
