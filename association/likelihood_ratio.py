@@ -44,12 +44,12 @@ def sides_log_density(innovation: SideInnovations, size: FloatArray, c: ModelCon
     y, S, d2 = innovation.y, innovation.S, innovation.d2.sum(axis=2)
     nu = c.degrees_of_freedom
     constant = float(gammaln((nu + SIDES) / 2.0) - gammaln(nu / 2.0) - SIDES / 2.0 * math.log(nu * math.pi))
-    body = constant - 0.5 * _log_determinant(S)[:, None] - (nu + SIDES) / 2.0 * np.log1p(d2 / nu)
-    extra = (c.outlier_std**2 * size.prod(axis=1))[:, None]
+    body = constant - 0.5 * _log_determinant(S) - (nu + SIDES) / 2.0 * np.log1p(d2 / nu)
+    extra = (c.outlier_std**2 * size.prod(axis=1))[:, None, None]
     wide = with_variance(S, extra, extra)
-    d2_wide = squared_distance(y, wide[:, None]).sum(axis=2)
+    d2_wide = squared_distance(y, wide).sum(axis=2)
     constant = -SIDES / 2.0 * math.log(2.0 * math.pi)
-    tail = constant - 0.5 * _log_determinant(wide)[:, None] - 0.5 * d2_wide
+    tail = constant - 0.5 * _log_determinant(wide) - 0.5 * d2_wide
     share = c.outlier_share
     whole = np.logaddexp(math.log1p(-share) + body, math.log(share) + tail)
     whole[np.minimum(d2, c.outlier_gate * d2_wide) > c.gate] = -np.inf
@@ -66,18 +66,18 @@ def cut_log_density(y: FloatArray, S: FloatArray, size: FloatArray, c: ModelCons
 
     Args:
         y: (N, M, 2, 2) innovations by axis and side.
-        S: (N, 2, 2, 2) their covariances.
+        S: (N, M, 2, 2, 2) their covariances.
         size: (N, 2) predicted width and height (px).
         c: constants.
     """
     out = np.full(y.shape[:2], -np.inf)
-    d2 = squared_distance(y, S[:, None])
+    d2 = squared_distance(y, S)
     log_det = np.log(determinant(S))
     for axis in range(2):
         across, extent = d2[..., 1 - axis], size[:, None, axis]
-        whole = -0.5 * (across + log_det[:, None, 1 - axis]) - 1.5 * _LOG_2PI - np.log(extent)
+        whole = -0.5 * (across + log_det[..., 1 - axis]) - 1.5 * _LOG_2PI - np.log(extent)
         for cut, inwards in ((0, y[..., axis, 0]), (1, -y[..., axis, 1])):
-            variance = S[:, None, axis, 1 - cut, 1 - cut]
+            variance = S[..., axis, 1 - cut, 1 - cut]
             alone = y[..., axis, 1 - cut] ** 2 / variance
             possible = (inwards < extent) & (inwards > -c.most_uncovered * extent)
             fits = possible & (across + alone <= c.cut_gate)
@@ -146,5 +146,5 @@ def assign(ratio: FloatArray) -> tuple[IntArray, IntArray]:
 
 
 def _log_determinant(S: FloatArray) -> FloatArray:
-    """Return Σ over both axes of ln det S (N,); S (N, 2, 2, 2)."""
-    return np.asarray(np.log(determinant(S)).sum(axis=1))
+    """Return Σ over both axes of ln det S (N, M); S (N, M, 2, 2, 2)."""
+    return np.asarray(np.log(determinant(S)).sum(axis=2))

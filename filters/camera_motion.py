@@ -7,6 +7,7 @@ least squares (Lange, Little and Taylor, *Robust statistical modeling using the 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,16 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.box_sides import side_variance
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.filters.singer import LOG_SIZE, POSITION, box_size
+from jeat_graph.filters.singer import (
+    GROWTH,
+    LOG_SIZE,
+    POSITION,
+    POSITION_ERROR,
+    SIZE_ERROR,
+    VELOCITY,
+    expected_centre,
+    expected_size,
+)
 
 # Tracks and boxes are paired by position and ln size, four numbers, with this gate (χ², 98 %).
 _GATE = 12.0
@@ -66,12 +76,12 @@ def estimate(
     """Estimate the camera's motion since the last scan.
 
     Args:
-        mean: (N, 2, 5) predicted states of tracks that are surely real.
-        covariance: (N, 2, 5, 5).
+        mean: (N, 2, 7) predicted states of tracks that are surely real.
+        covariance: (N, 2, 7, 7).
         boxes: (M, 4) left, top, right, bottom (px).
         log_variance: ln ρ² of the sensor's sides.
         picture: width and height (px).
-        dt: time since the tracks' last prediction (s).
+        dt: time since the tracks' last prediction (s), > 0.
         prior: learnt variances.
         c: constants.
 
@@ -80,17 +90,17 @@ def estimate(
     """
     if len(mean) < _LEAST_TRACKS or not len(boxes):
         return None, prior
-    size = box_size(mean)
+    size = expected_size(mean)
     scale = np.sqrt(size.prod(axis=1))
     R = side_variance(size, log_variance, c)
-    S = covariance[..., POSITION, POSITION] + R / 2.0
-    S_size = covariance[..., LOG_SIZE, LOG_SIZE] + 2.0 * R / size**2
-    y = (boxes[:, :2] + boxes[:, 2:])[None] / 2.0 - mean[:, None, :, POSITION]
-    y_size = np.log(boxes[:, 2:] - boxes[:, :2])[None] - mean[:, None, :, LOG_SIZE]
+    S = _variance_of_sum(covariance, POSITION, POSITION_ERROR) + R / 2.0
+    S_size = _variance_of_sum(covariance, LOG_SIZE, SIZE_ERROR) + 2.0 * R / size**2
+    y = (boxes[:, :2] + boxes[:, 2:])[None] / 2.0 - expected_centre(mean)[:, None]
+    y_size = np.log(boxes[:, 2:] - boxes[:, :2])[None] - np.log(size)[:, None]
     d2_size = (y_size**2 / S_size[:, None]).sum(axis=2)
     allowance = min(prior.shift * _PAIRING_DEVIATIONS, _PAIRING_MOST) * scale**2
     wide = (S + allowance[:, None])[:, None]
-    centre = mean[:, :, POSITION] - np.array(picture) / 2.0
+    centre = expected_centre(mean) - np.array(picture) / 2.0
     # The camera may have gone on as before: rows of like objects are else taken for their neighbours.
     again = prior.last[:2] * dt + prior.last[2] * dt * centre
     track, box = _nearest(y**2 / wide, d2_size)
@@ -99,7 +109,7 @@ def estimate(
         track, box = moved
     if len(track) < _LEAST_TRACKS:
         return None, prior
-    place = mean[track][:, :, POSITION] - np.array(picture) / 2.0
+    place = centre[track]
     typical = float(np.median(scale[track]))
     precision = 1.0 / np.array([prior.shift * typical**2, prior.shift * typical**2, prior.scale])
     motion = _reweighted_least_squares(y[track, box], S[track], place, precision)
@@ -107,16 +117,42 @@ def estimate(
 
 
 def compensate(
-    mean: FloatArray, covariance: FloatArray, motion: CameraMotion, picture: tuple[float, float]
+    mean: FloatArray,
+    covariance: FloatArray,
+    motion: CameraMotion,
+    picture: tuple[float, float],
+    dt: float,
+    c: ModelConstants,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the states (N, 2, 5) and covariances as the camera sees them after its motion."""
+    """Return the states (N, 2, 7) and covariances as the camera sees them after its motion.
+
+    A camera that goes on for ever and tracks that all move cannot be told apart: θ and the tracks' velocities
+    could grow against each other without end. So what lasts of θ is theirs: (1 − e^(−Δ/τ)) θ/Δ goes over to
+    their velocities and rates of growth, and the mean of θ over more than τ is 0.
+
+    Args:
+        mean: (N, 2, 7).
+        covariance: (N, 2, 7, 7).
+        motion: of the camera.
+        picture: width and height (px).
+        dt: the time that it took (s), > 0.
+        c: constants.
+    """
     shift, scale = motion.theta[:2], motion.theta[2]
+    lasting = (1.0 - math.exp(-dt / c.camera_time_s)) / dt
     mean, covariance = mean.copy(), covariance.copy()
-    place = mean[:, :, POSITION]
-    mean[:, :, POSITION] = place + shift + scale * (place - np.array(picture) / 2.0)
+    moved = shift + scale * (mean[:, :, POSITION] - np.array(picture) / 2.0)
+    mean[:, :, POSITION] += moved
+    mean[:, :, VELOCITY] += lasting * moved
     mean[:, :, LOG_SIZE] += scale
+    mean[:, :, GROWTH] += lasting * scale
     covariance[..., POSITION, POSITION] += np.diag(motion.covariance)[:2]
     return mean, covariance
+
+
+def _variance_of_sum(covariance: FloatArray, i: int, j: int) -> FloatArray:
+    """Return the variance (N, 2) by axis of the sum of two states."""
+    return np.asarray(covariance[..., i, i] + 2.0 * covariance[..., i, j] + covariance[..., j, j])
 
 
 def _nearest(d2: FloatArray, d2_size: FloatArray) -> tuple[IntArray, IntArray]:
@@ -164,5 +200,5 @@ def _learnt(
     return CameraVariance(
         float(np.clip(shift, low[0] ** 2, low[1] ** 2)),
         float(np.clip(scale, high[0] ** 2, high[1] ** 2)),
-        motion.theta / dt if dt > 0.0 else prior.last,
+        motion.theta / dt,
     )

@@ -19,6 +19,8 @@ class ModelConstants:
         velocity_time_s: correlation time of the velocity (s); objects that nobody sees come to rest at last.
         acceleration_time_s: correlation time of the acceleration (s) (Singer 1970).
         growth_time_s: correlation time of the rate of ln size (s).
+        error_time_s: correlation time of the part of a detector's error that lasts (s). Measured.
+        error_share: its variance, in that of the error that is new in every box. Measured.
         jerk: root spectral density of what drives the acceleration (sizes/s^2.5). Prior.
         growth_noise: that of what drives the rate of ln size (1/s^1.5). Prior.
         position_walk: that of the position's random walk (sizes/√s). Prior.
@@ -40,6 +42,10 @@ class ModelConstants:
         cut_gate: largest squared Mahalanobis distance of the other three sides (χ² of 3, .9998).
         outlier_share: share of boxes that cover a part of the object, or more than it.
         outlier_std: standard deviation of a side of these (sizes).
+        edge_px: a side that is no further from the edge of the picture lies there (px).
+        edge_std: standard deviation of a side that the edge has cut (sizes): 1/√(2π), of which the density at
+            0 is one over the size.
+        edge_birth: how far a track may reach beyond the edge that it begins at (sizes).
         offset_count: pairs of boxes that the prior of two sensors' mean difference counts for.
         offset_clip: difference from the mean (sizes, or ln size) from which on a pair counts for less.
         offset_age_s: boxes of two sensors that are further apart in time are not compared (s).
@@ -103,6 +109,7 @@ class ModelConstants:
         camera_shift_std, camera_scale_std: of common shift (sizes) and scale between two scans. Prior.
         camera_shift_bounds, camera_scale_bounds: of the learnt values.
         camera_memory: share of these variances that a scan keeps.
+        camera_time_s: what lasts longer of the camera's motion is the tracks' own (s).
         report: least posterior, times the survival of its gap, of a track that is reported.
         inside_share: least share of a box within the picture of a track that is reported while nobody sees
         it. rival, rival_age_s: least posterior, and longest time since its last detection (s), of a track
@@ -118,6 +125,8 @@ class ModelConstants:
     velocity_time_s: float = 20.0
     acceleration_time_s: float = 0.5
     growth_time_s: float = 1.0
+    error_time_s: float = 0.5
+    error_share: float = 0.5
     jerk: float = 2.0
     growth_noise: float = 0.5
     position_walk: float = 0.05
@@ -140,6 +149,9 @@ class ModelConstants:
     outlier_share: float = 0.2
     outlier_std: float = 0.3
 
+    edge_px: float = 3.0
+    edge_std: float = 0.4
+    edge_birth: float = 0.5
     offset_count: float = 10.0
     offset_clip: float = 0.2
     offset_age_s: float = 0.011
@@ -176,8 +188,8 @@ class ModelConstants:
     p_detect_count: float = 6.0
     looks_count: float = 5.0
     chance_hit: float = 0.02
-    unseen_share: float = 0.1
-    unseen_bounds: tuple[float, float] = (0.1, 0.9)
+    unseen_share: float = 0.2
+    unseen_bounds: tuple[float, float] = (0.2, 0.9)
     shared_false: float = 0.3
     noise_share: float = 0.5
     noise_bounds: tuple[float, float] = (0.05, 0.95)
@@ -217,6 +229,7 @@ class ModelConstants:
     camera_shift_bounds: tuple[float, float] = (1e-3, 0.2**0.5)
     camera_scale_bounds: tuple[float, float] = (1e-4, 0.1)
     camera_memory: float = 0.97
+    camera_time_s: float = 0.3
 
     report: float = 0.5
     inside_share: float = 0.8

@@ -1,18 +1,22 @@
 """Singer's motion model of the box centre, and of the logarithm of its size, one axis at a time.
 
-State of one axis: [p, v, a, l, r]: position (px), velocity (px/s), acceleration (px/s²), ln size, its rate
-(1/s).
+State of one axis: [p, v, a, l, r, b, c]: position (px), velocity (px/s), acceleration (px/s²), ln size, its
+rate (1/s), and what lasts of the detectors' errors of position (px) and of ln size: boxes measure p + b and
+l + c.
 
     dp = v dt + σ_p dβ₁,   dv = (a − v/τ_v) dt,   da = −a/τ_a dt + σ_j dβ₂,
     dl = r dt + σ_l dβ₃,   dr = −r/τ_r dt + σ_r dβ₄
+    db = −b/τ_e dt + σ_b √(2/τ_e) dβ₅,   dc = −c/τ_e dt + σ_c √(2/τ_e) dβ₆
 
 (Singer, *Estimating optimal tracking filter performance for manned maneuvering targets*, 1970; Särkkä and
 Solin, *Applied Stochastic Differential Equations*, ch. 6). The random walks of position and size stand for
 what a detector's boxes do that lasts and is no motion. For τ → ∞ and σ_p = 0 the first three are the paper's
 constant acceleration driven by white jerk (eq. 2). On top of that a point that moves at constant velocity in
 space has the image x = X/Z, so with g = −Ż/Z, the growth rate of its size, ẍ = 2 g ẋ and ġ = g²: see
-`in_perspective`. Arrays hold all tracks: mean (N, 2, 5), covariance (N, 2,
-5, 5); the axes are independent.
+`in_perspective`. The errors are first-order Gauss–Markov processes (Bryson and Johansen, "Linear filtering
+for time-varying systems using measurements containing colored noise", IEEE T-AC 10(1), 1965) with the
+variances of `lasting_error`. Arrays hold all tracks: mean (N, 2, 7), covariance (N, 2, 7, 7); the axes are
+independent.
 """
 
 from __future__ import annotations
@@ -28,7 +32,9 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.model_constants import ModelConstants
 
 #: Places in the state of one axis, and its length.
-POSITION, VELOCITY, ACCELERATION, LOG_SIZE, GROWTH, STATES = range(6)
+POSITION, VELOCITY, ACCELERATION, LOG_SIZE, GROWTH, POSITION_ERROR, SIZE_ERROR, STATES = range(8)
+#: Those of the motion stand before those of the errors.
+MOTION = POSITION_ERROR
 # Van Loan's exponential has terms e^(Δ/τ), which overflow for long steps: these are made by doubling.
 _LONGEST_STEP_S = 1.0
 # Steps are taken in whole microseconds: what follows depends on time differences, not on the clock's origin.
@@ -56,7 +62,7 @@ class ProcessNoise(NamedTuple):
 
 
 class Discretised(NamedTuple):
-    """The model over one step: transition, and the covariance by each noise of unit density, (5, 5) each."""
+    """The model over one step: transition, and the covariance by each noise of unit density, (7, 7) each."""
 
     F: FloatArray
     jerk: FloatArray
@@ -68,6 +74,11 @@ class Discretised(NamedTuple):
 def initial_process_noise(c: ModelConstants) -> ProcessNoise:
     """Return the process noise before anything is learnt."""
     return ProcessNoise(*(2.0 * math.log(s) for s in (c.jerk, c.growth_noise, c.position_walk, c.size_walk)))
+
+
+def whole_microseconds(dt: float) -> float:
+    """Return a length of time (s) to the microsecond."""
+    return round(dt * _TICKS_PER_S) / _TICKS_PER_S
 
 
 def discretise(dt: float, c: ModelConstants) -> Discretised:
@@ -100,19 +111,20 @@ def _discretised(ticks: int, c: ModelConstants) -> Discretised:
 
 
 def drift(c: ModelConstants) -> FloatArray:
-    """Return the drift matrix A (5, 5) of dx = A x dt + noise."""
+    """Return the drift matrix A (7, 7) of dx = A x dt + noise."""
     A = np.zeros((STATES, STATES))
     A[POSITION, VELOCITY] = A[VELOCITY, ACCELERATION] = A[LOG_SIZE, GROWTH] = 1.0
     A[VELOCITY, VELOCITY] = -1.0 / c.velocity_time_s
     A[ACCELERATION, ACCELERATION] = -1.0 / c.acceleration_time_s
     A[GROWTH, GROWTH] = -1.0 / c.growth_time_s
+    A[POSITION_ERROR, POSITION_ERROR] = A[SIZE_ERROR, SIZE_ERROR] = -1.0 / c.error_time_s
     return A
 
 
 def process_covariance(
     size: FloatArray, growth: FloatArray, step: Discretised, q: ProcessNoise, c: ModelConstants
 ) -> FloatArray:
-    """Return the covariance Q (N, 1, 5, 5) that a step adds to tracks; both axes have the same.
+    """Return the covariance Q (N, 1, 7, 7) that a step adds to the motion; both axes have the same.
 
     Q = s² (σ_j + k g^2.5)² Q_j + σ_r² Q_r + s² σ_p² Q_p + σ_l² Q_l.
 
@@ -134,14 +146,14 @@ def process_covariance(
 
 
 def in_perspective(F: FloatArray, mean: FloatArray, dt: float, c: ModelConstants) -> FloatArray:
-    """Return the transitions (N, 1, 5, 5) of tracks that keep their velocity in space, both axes alike.
+    """Return the transitions (N, 1, 7, 7) of tracks that keep their velocity in space, both axes alike.
 
     With g the mean growth rate of both axes, v̇ = 2 g v and ġ = g² have the solutions v e^(2 g Δ) and
     g / (1 − g Δ); position and ln size follow by their integrals. g counts as known.
 
     Args:
-        F: (5, 5) transition of a track that does not grow.
-        mean: (N, 2, 5) states before the step.
+        F: (7, 7) transition of a track that does not grow.
+        mean: (N, 2, 7) states before the step.
         dt: length of the step (s).
         c: constants.
     """
@@ -156,28 +168,61 @@ def in_perspective(F: FloatArray, mean: FloatArray, dt: float, c: ModelConstants
     return out
 
 
+def lasting_error(size: FloatArray, log_variance: float, c: ModelConstants) -> tuple[FloatArray, FloatArray]:
+    """Return the stationary variances (N, 2) by axis of b (px²) and of c.
+
+    Both sides err independently, with the variance κ ρ² (½ √(w h) + ½ w)²: the centre with half of it, ln
+    size with 2/w² of it. κ is the ratio of what lasts to what is new in every scan.
+
+    Args:
+        size: (N, 2) width and height (px).
+        log_variance: ln ρ² of the sides.
+        c: constants.
+    """
+    both = np.sqrt(size.prod(axis=1))[:, None]
+    side = c.error_share * math.exp(log_variance) * (0.5 * both + 0.5 * size) ** 2
+    return side / 2.0, 2.0 * side / size**2
+
+
 def predict(
     mean: FloatArray,
     covariance: FloatArray,
     step: Discretised,
     F: FloatArray,
     q: ProcessNoise,
+    log_variance: float,
     c: ModelConstants,
 ) -> tuple[FloatArray, FloatArray]:
     """Predict all tracks over a step: m⁻ = F m, P⁻ = F P Fᵀ + Q.
 
     Args:
-        mean: (N, 2, 5).
-        covariance: (N, 2, 5, 5).
+        mean: (N, 2, 7).
+        covariance: (N, 2, 7, 7).
         step: the model over that time.
-        F: (N, 1, 5, 5) transitions of the tracks, of `in_perspective`.
+        F: (N, 1, 7, 7) transitions of the tracks, of `in_perspective`.
         q: densities of the process noise.
+        log_variance: ln ρ² of the sides of the scene's boxes, for the errors that last.
         c: constants.
     """
     predicted = (F @ mean[..., None])[..., 0]
     growth = np.abs(predicted[:, :, GROWTH]).mean(axis=1)
-    Q = process_covariance(object_size(mean), growth, step, q, c)
+    Q = np.repeat(process_covariance(object_size(mean), growth, step, q, c), 2, axis=1)
+    # σ² (1 − φ²), with φ = e^(−Δ/τ): the error keeps its variance.
+    forgotten = 1.0 - step.F[POSITION_ERROR, POSITION_ERROR] ** 2
+    position, size = lasting_error(box_size(mean), log_variance, c)
+    Q[..., POSITION_ERROR, POSITION_ERROR] += forgotten * position
+    Q[..., SIZE_ERROR, SIZE_ERROR] += forgotten * size
     return predicted, F @ covariance @ F.transpose(0, 1, 3, 2) + Q
+
+
+def expected_centre(mean: FloatArray) -> FloatArray:
+    """Return the centre (N, 2) of the box that a detector is expected to give (px)."""
+    return np.asarray(mean[:, :, POSITION] + mean[:, :, POSITION_ERROR])
+
+
+def expected_size(mean: FloatArray) -> FloatArray:
+    """Return width and height (N, 2) of the box that a detector is expected to give (px)."""
+    return np.asarray(np.exp(mean[:, :, LOG_SIZE] + mean[:, :, SIZE_ERROR]))
 
 
 def box_size(mean: FloatArray) -> FloatArray:

@@ -56,7 +56,9 @@ class FilteredTrack:
         """
         gained = (self.predicted_covariance - self.covariance)[:, :, 0, 0]
         moved = (self.mean - self.predicted_mean)[:, :, 0]
-        known = (self.sensor >= 0) & (gained > _LEAST_GAIN * self.predicted_covariance[:, :, 0, 0]).all(axis=1)
+        known = (self.sensor >= 0) & (gained > _LEAST_GAIN * self.predicted_covariance[:, :, 0, 0]).all(
+            axis=1
+        )
         known[:1] = False  # what began the track was not expected
         rows = np.flatnonzero(known)
         return rows, np.asarray(moved[rows] / np.sqrt(gained[rows]))
@@ -128,7 +130,9 @@ def tracks_of(
         name: np.concatenate([getattr(one, name) for one in records])[order]
         for name in ("predicted_mean", "predicted_covariance", "mean", "covariance")
     }
-    F = np.concatenate([np.broadcast_to(one.F, (len(one.F), axes, *one.F.shape[2:])) for one in records])[order]
+    F = np.concatenate([np.broadcast_to(one.F, (len(one.F), axes, *one.F.shape[2:])) for one in records])[
+        order
+    ]
     times, sensor = np.repeat(t, counts)[order], np.concatenate(sensors)[order]
     starts = np.flatnonzero(np.diff(ids[order], prepend=-1))
     out = []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
@@ -27,20 +29,23 @@ class FixedLagChain:
         self._oldest = self._newest = 0  # numbers of the first and the last state in it
         self._begun = False
 
-    def append(self, rows: SegmentRows, reference: FloatArray) -> None:
-        """Take in a segment behind the newest state.
+    def append(self, factors: Sequence[FloatArray], references: Sequence[FloatArray]) -> None:
+        """Take in segments behind the newest state.
 
         Args:
-            rows: its rows.
-            reference: (2, 3) what its last state is counted from.
+            factors: (6, 8) each (`gtsam.elimination`).
+            references: (2, 3) each: what its last state is counted from.
         """
-        graph, first = LinearGraph(reference.shape[-1]), self._newest + 1
+        if not factors:
+            return
+        graph, first = LinearGraph(references[0].shape[-1]), self._newest + 1
         if not self._begun:
             graph.add_prior(0, *prior_rows(self._prior))
             self._begun, first = True, 0
-        graph.add_segment(self._newest, rows)
-        self._newest += 1
-        self._references.append(reference)
+        for factor in factors:
+            graph.add_segment(self._newest, SegmentRows.of(factor))
+            self._newest += 1
+        self._references.extend(references)
         self._window.update(graph, first, self._newest - first + 1)
 
     def means(self, numbers: range) -> FloatArray:

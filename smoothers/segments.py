@@ -5,16 +5,16 @@ For a filter with states m_k, P_k and predictions m⁻_{k+1} = F m_k, P⁻_{k+1}
     x_k | x_{k+1} ~ N(m_k + G_k (x_{k+1} − m⁻_{k+1}), Γ_k),
     G_k = P_k Fᵀ (P⁻_{k+1})⁻¹,   Γ_k = (I − G_k F) P_k (I − G_k F)ᵀ + G_k Q G_kᵀ
 
-(Särkkä, *Bayesian Filtering and Smoothing*, theorem 8.2; Γ in Joseph form). Such conditionals combine, so that
-of a segment of K steps x_k | x_K ~ N(a_k + E_k (x_K − m_K), L_k) with
+(Särkkä, *Bayesian Filtering and Smoothing*, theorem 8.2; Γ in Joseph form). Such conditionals combine, so
+that of a segment of K steps x_k | x_K ~ N(a_k + E_k (x_K − m_K), L_k) with
 
-    a_k = m_k + G_k (a_{k+1} − m⁻_{k+1}),   E_k = G_k E_{k+1},   L_k = Γ_k + G_k L_{k+1} G_kᵀ
+    a_k = (m_k − G_k m⁻_{k+1}) + G_k a_{k+1},   E_k = G_k E_{k+1},   L_k = Γ_k + G_k L_{k+1} G_kᵀ
 
 and (a, E, L)_K = (m_K, I, 0). Whatever follows the segment tells of x_K alone: once its smoothed mean and
 covariance are known, those of all states before it follow at once, without a pass.
 
-Arrays are those of n tracks that share the times of the steps; a state has A independent axes of D components,
-all with the same covariance.
+Arrays are those of n tracks that share the times of the steps; a state has A independent axes of D
+components, all with the same covariance.
 """
 
 from __future__ import annotations
@@ -69,16 +69,21 @@ def given_last(F: FloatArray, Q: FloatArray, mean: FloatArray, cov: FloatArray) 
     Returns:
         Of shapes (n, K + 1, ...).
     """
+    size, keys = F.shape[-1], len(F)
     G, own = gains(F, Q, cov[:, :-1])
-    predicted = mean[:, :-1] @ transposed(F)
-    a, E, L = mean.copy(), np.zeros_like(cov), np.zeros_like(cov)
-    E[:, -1] = np.eye(F.shape[-1])
-    for k in range(len(F) - 1, -1, -1):
-        back = transposed(G[:, k])
-        a[:, k] += (a[:, k + 1] - predicted[:, k]) @ back
-        E[:, k] = G[:, k] @ E[:, k + 1]
-        L[:, k] = own[:, k] + G[:, k] @ L[:, k + 1] @ back
-    return Given(a, E, L)
+    known = transposed(mean[:, :-1]) - G @ (F @ transposed(mean[:, :-1]))
+    # E and a together: both are what G makes of the next key's.
+    both = np.zeros((*cov.shape[:-1], size + mean.shape[2]))
+    both[:, -1, :, :size] = np.eye(size)
+    both[:, -1, :, size:] = transposed(mean[:, -1])
+    both[:, :-1, :, size:] = known
+    L = np.zeros_like(cov)
+    L[:, :-1] = own
+    back = transposed(G)
+    for k in range(keys - 1, -1, -1):
+        both[:, k] += G[:, k] @ both[:, k + 1]
+        L[:, k] += G[:, k] @ L[:, k + 1] @ back[:, k]
+    return Given(transposed(both[..., size:]), both[..., :size], L)
 
 
 def smoothed_by(

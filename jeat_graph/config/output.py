@@ -14,4 +14,4 @@ class OutputConfig(Section):
     min_existence: float = number(
         0.5, "1", "rows are written where the probability that the object exists is above this", 0.0, 1.0
     )
-    clip: bool = flag(False, "clip boxes to the picture and drop those outside it")
+    clip: bool = flag(True, "let boxes end at the edge of the picture where the detectors' boxes do")

@@ -14,11 +14,11 @@ class SmootherConfig(Section):
     """How trajectories are smoothed."""
 
     engine: str = choice(
-        "rts",
+        "fixed-lag",
         ENGINES,
-        "rts: a Rauch-Tung-Striebel pass over each whole track once it has ended; fixed-lag-rts: the same, "
-        "rows being final twice `lag_s` later; full and fixed-lag: the same by a factor graph in GTSAM, of "
-        "the engine `paper` (the others run their RTS pass); none: no smoothing",
+        "fixed-lag: rows are final at most twice `lag_s` later; full: once their track has ended; both by a "
+        "Rauch-Tung-Striebel pass, of the engine `paper` by a factor graph in GTSAM, and there fixed-lag-rts "
+        "and rts are the same by its own pass; none: no smoothing",
     )
     lag_s: float = number(
         1.0, "s", "fixed lag: a state is final once this much time has followed", open_low=True

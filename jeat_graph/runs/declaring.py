@@ -26,8 +26,6 @@ _ROUNDING_PX = 0.05
 _PILE, _PILE_PX, _BEGIN_PX = 5, 0.5, 10.0
 # Edges of two recordings that are as near to each other (px) are those of pictures of one size.
 _SAME_EDGE_PX = 2.0
-# A detector does not clip its boxes if such a share of them reaches further outside the picture (px).
-_BEYOND_PX, _BEYOND_SHARE = 10.0, 0.01
 # Fewer scans do not tell a clock.
 LEAST_SCANS = 3
 
@@ -45,9 +43,6 @@ def fit_input(config: Config, *recordings: Detections) -> tuple[Config, list[str
     notes: list[str] = []
     if config.input.undeclared == "declare" and any(d.num_scans for d in recordings):
         config, notes = _declare_sensors(config, recordings)
-    if config.output.clip and config.input.picture == "given" and _reach_beyond(config, recordings):
-        config = replace(config, output=replace(config.output, clip=False))
-        notes.append("boxes reach beyond the picture: tracks are not clipped to it either")
     if config.input.picture == "seen" and any(len(d) for d in recordings):
         config = fit_picture(config, recordings)
         notes.append(
@@ -56,17 +51,6 @@ def fit_input(config: Config, *recordings: Detections) -> tuple[Config, list[str
             "(--image WxH says otherwise)"
         )
     return config, notes
-
-
-def _reach_beyond(config: Config, recordings: Sequence[Detections]) -> bool:
-    """Whether detectors follow objects beyond the picture, instead of cutting boxes at its edge."""
-    filled = [d.boxes for d in recordings if len(d)]
-    if not filled or config.input.undeclared != "declare":
-        return False
-    boxes = np.concatenate(filled)
-    size = np.array([config.image.width, config.image.height])
-    beyond = np.maximum(-boxes[:, :2], boxes[:, :2] + boxes[:, 2:] - size).max(axis=1)
-    return bool(np.mean(beyond > _BEYOND_PX) >= _BEYOND_SHARE)
 
 
 def fit_picture(config: Config, recordings: Sequence[Detections]) -> Config:

@@ -102,7 +102,8 @@ def records_of(
     rows["log_size"], rows["size_var"] = np.log(size), 2.0 * side / size**2
     if born.any():
         corners = np.concatenate([told.boxes[:, :2], told.boxes[:, :2] + size], axis=1)
-        _, first = box_sides.initial_state(corners[born], 0.0, c)
+        whole = np.zeros((int(born.sum()), 2, 2), dtype=np.bool_)
+        _, first = box_sides.initial_state(corners[born], whole, 0.0, 0.0, c)
         rows["velocity_var"][born] = first[:, :, singer.VELOCITY, singer.VELOCITY]
         rows["acceleration_var"][born] = first[:, :, singer.ACCELERATION, singer.ACCELERATION]
         rows["rate_var"][born] = first[:, :, singer.GROWTH, singer.GROWTH].mean(axis=1)

@@ -52,6 +52,7 @@ def table_of(
     places: Places,
     called: ClassNames | None,
     instants: FloatArray | None = None,
+    clip: tuple[float, float] | None = None,
 ) -> Trajectories:
     """Return rows as a table.
 
@@ -61,18 +62,21 @@ def table_of(
         places: where the model's sensors stand among these.
         called: the classes; None for a table without any.
         instants: at which there was a table, be it of no row (s).
+        clip: width and height of the picture (px) at whose edge boxes end; None where they do not.
     """
     t, ids, mean, variance, real, used, label, share = rows
-    state, spread = mean.reshape(-1, 2, singer.STATES), variance.reshape(-1, 2, singer.STATES)
+    state, spread = mean.reshape(-1, 2, singer.MOTION), variance.reshape(-1, 2, singer.MOTION)
     sides, size = box_sides.corners(state), singer.box_size(state)
+    if clip is not None:
+        sides = np.clip(sides, 0.0, np.array([*clip, *clip]))
     classes = None
     if called is not None:
         # The last one is for those below 0.
         classes = np.array([*called.names, ""], dtype=np.str_)[label], np.where(label >= 0, share, np.nan)
-    return Trajectories(
+    table = Trajectories(
         t=t,
         track_id=ids,
-        boxes=np.concatenate([sides[:, :2], size], axis=1),
+        boxes=np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], axis=1),
         existence=real,
         mean=state[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
         var=spread[:, :, _MOTION].transpose(0, 2, 1).reshape(-1, 6),
@@ -84,6 +88,8 @@ def table_of(
         instants=instants,
         class_ids=(called.numbers or None) if called is not None else None,
     )
+    left = (table.boxes[:, 2:] > 0.0).all(axis=1)
+    return table if left.all() else table.take(np.flatnonzero(left))
 
 
 class Places:

@@ -69,8 +69,8 @@ class PendingStep(NamedTuple):
 class ModelTracker(Updates, SavedModel):
     """The model as a tracker.
 
-    Sensors have any names and are known from their first scan on. Boxes are reported as they are, beyond the
-    picture too. Of the configuration it takes the size of the picture, if that was given, the smoother (with
+    Sensors have any names and are known from their first scan on. Boxes are reported up to the edge of the
+    picture where `output.clip` says so and the detectors' end there, else as they are. Of the configuration it takes the size of the picture, if that was given, the smoother (with
     a fixed lag rows are final after twice `smoother.lag_s`, else when their track has ended), and of a sensor
     its own picture, what kind it is and at which score its boxes are as likely real as not.
 
@@ -462,7 +462,9 @@ class ModelTracker(Updates, SavedModel):
     def _table(self, rows: ModelRows, instants: FloatArray | None = None) -> Trajectories:
         """Return rows as a table, whose sensors are those of the configuration."""
         names = None if self._classes is None else ClassNames(self._called, self._class_ids)
-        return table_of(rows, self.sensor_names, self._places, names, instants)
+        ends = self.config.output.clip and self._model.boxes_end_at_edge()
+        clip = (self.config.image.width, self.config.image.height) if ends else None
+        return table_of(rows, self.sensor_names, self._places, names, instants, clip)
 
     def _find_places(self) -> None:
         """Find out where the model's sensors stand among all."""

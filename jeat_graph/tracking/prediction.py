@@ -41,13 +41,18 @@ def predicted(
     Returns:
         The rows then, which no sensor has seen, and the covariances (N, 2, 5, 5).
     """
-    shape = (len(rows[0]), 2, singer.STATES)
-    mean, covariance = rows[2].reshape(shape), covariances.reshape(*shape, singer.STATES)
+    shape = (len(rows[0]), 2, singer.MOTION)
+    mean, covariance = rows[2].reshape(shape), covariances.reshape(*shape, singer.MOTION)
     dt = float(t - rows[0][0]) if len(rows[0]) else 0.0
     if dt > 0.0:
         model = singer.discretise(dt, c)
-        F = singer.in_perspective(model.F, mean, dt, c)
-        mean, covariance = singer.predict(mean, covariance, model, F, q, c)
+        # Errors of detectors move nothing: any will do.
+        error = singer.STATES - singer.MOTION
+        whole = np.pad(mean, ((0, 0), (0, 0), (0, error)))
+        spread = np.pad(covariance, ((0, 0), (0, 0), (0, error), (0, error)))
+        F = singer.in_perspective(model.F, whole, dt, c)
+        whole, spread = singer.predict(whole, spread, model, F, q, 0.0, c)
+        mean, covariance = whole[..., : singer.MOTION], spread[..., : singer.MOTION, : singer.MOTION]
     variance = np.diagonal(covariance, axis1=2, axis2=3).reshape(-1, 2 * singer.STATES)
     flat = mean.reshape(-1, 2 * singer.STATES)
     _, ids, _, _, real, used, label, share = rows
@@ -56,7 +61,7 @@ def predicted(
 
 def still_there(rows: ModelRows, picture: tuple[float, float]) -> FloatArray:
     """Return which rows (N,) have a box that some part of the picture (px) shows."""
-    boxes = box_sides.corners(rows[2].reshape(-1, 2, singer.STATES))
+    boxes = box_sides.corners(rows[2].reshape(-1, 2, singer.MOTION))
     return np.asarray(((boxes[:, 2:] > 0.0) & (boxes[:, :2] < picture)).all(axis=1))
 
 

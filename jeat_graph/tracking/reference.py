@@ -136,11 +136,14 @@ def order_of_scans(state: ReferenceState, scans: Sequence[SensorScan]) -> list[i
 
 
 def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -> ScanClock:
-    """Take notice of a scan: the sensor's period, its indifference point, the unknown picture."""
+    """Take notice of a scan: the sensor's period, its indifference point, the picture and its edges."""
     k = scan.sensor
     if not state.picture_known and len(scan.boxes):
         width, height = scan.boxes[:, 2:].max(axis=0)
         state.picture = max(state.picture[0], float(width)), max(state.picture[1], float(height))
+    if state.picture_known:
+        state.boxes_beyond[k] += box_sides.beyond_edge(scan.boxes, state.picture, c).sum()
+        state.boxes_at_edge[k] += box_sides.at_edge(scan.boxes, state.picture, c).any(axis=(1, 2)).sum()
     since = t - state.last_look_s[k]
     if not math.isnan(since):
         known = not math.isnan(state.period_s[k])
@@ -157,34 +160,46 @@ def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -
 
 
 def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
-    """Predict states and presence to a time; return the transitions (N, 1, 5, 5) of the tracks."""
+    """Predict states and presence to a time; return the transitions (N, 1, 7, 7) of the tracks."""
     dt = 0.0 if state.t is None else t - state.t
     state.t = t
     model = singer.discretise(dt, c)
     tracks = state.tracks
     F = singer.in_perspective(model.F, tracks.mean, dt, c)
     if dt > 0.0 and len(tracks):
-        mean, covariance = singer.predict(tracks.mean, tracks.covariance, model, F, state.process_noise, c)
+        noise = state.process_noise, state.log_scene_variance
+        mean, covariance = singer.predict(tracks.mean, tracks.covariance, model, F, *noise, c)
         presence = visibility.predict(tracks.presence, dt, c)
         state.tracks = replace(tracks, mean=mean, covariance=covariance, presence=presence)
     return F
 
 
 def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> SensorScan:
-    """Return the scan with boxes as the sensors have them on the average."""
-    offset = sensor_offsets.offsets(state.offsets, state.log_side_variance, c)[scan.sensor]
-    return scan._replace(boxes=sensor_offsets.corrected(scan.boxes, offset))
+    """Return the scan with boxes as the sensors have them on the average, and which sides end at the edge.
+
+    A detector whose boxes end at the edge more often than they reach beyond is taken to cut them there.
+    """
+    k = scan.sensor
+    cuts = state.picture_known and bool(state.boxes_at_edge[k] >= state.boxes_beyond[k])
+    edges = box_sides.at_edge(scan.boxes, state.picture, c) & cuts
+    offset = sensor_offsets.offsets(state.offsets, state.log_side_variance, c)[k]
+    return scan._replace(boxes=sensor_offsets.corrected(scan.boxes, offset), edges=edges)
 
 
 def follow_camera(state: ReferenceState, scan: SensorScan, dt: float, c: ModelConstants) -> None:
     """Estimate what shift and scale all tracks have in common over `dt` seconds, and take them along."""
+    dt = singer.whole_microseconds(dt)
+    if dt <= 0.0:
+        return
     tracks, noise = state.tracks, float(state.log_side_variance[scan.sensor])
     recent = state.time - tracks.evidence.last_s < _CAMERA_AGE_S
     sure = (tracks.real > c.report) & (tracks.evidence.detections > _CAMERA_DETECTIONS) & recent
     seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
     motion, state.camera = camera_motion.estimate(*seen, noise, state.picture, dt, state.camera, c)
     if motion is not None:
-        mean, covariance = camera_motion.compensate(tracks.mean, tracks.covariance, motion, state.picture)
+        mean, covariance = camera_motion.compensate(
+            tracks.mean, tracks.covariance, motion, state.picture, dt, c
+        )
         state.tracks = replace(tracks, mean=mean, covariance=covariance)
 
 
@@ -197,8 +212,8 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     )
     p_detect = np.clip(p_detect, *c.track_p_detect_bounds)
     noise = float(state.log_side_variance[k])
-    innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, noise, c)
-    size = singer.box_size(tracks.mean)
+    innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, scan.edges, noise, c)
+    size = singer.expected_size(tracks.mean)
     density = likelihood_ratio.sides_log_density(innovation, size, c)
     score = likelihood_ratio.score_log_ratio(tracks.real, state.sensors.indifference[k] + scan.logits, c)
     clutter = likelihood_ratio.clutter_log_density(size, float(state.leftovers[k]), state.picture, c)
@@ -226,7 +241,8 @@ def count_gaps(state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, 
     gap = state.time - tracks.evidence.last_s[pairs.track]
     period = np.nanmin(np.append(state.period_s, _LONGEST_PERIOD_S))
     ends = (tracks.real[pairs.track] > c.report) & (gap > _GAP_PERIODS * period)
-    predicted, found = box_sides.corners(tracks.mean[pairs.track[ends]]), scan.boxes[pairs.box[ends]]
+    predicted = box_sides.expected_corners(tracks.mean[pairs.track[ends]])
+    found = scan.boxes[pairs.box[ends]]
     overlap = np.diagonal(box_sides.intersection_over_union(predicted, found))
     state.gaps = gap_survival.count_ends(state.gaps, gap[ends], overlap >= c.gap_overlap)
 
@@ -234,11 +250,15 @@ def count_gaps(state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, 
 def learn_noise(
     state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, clock: ScanClock, c: ModelConstants
 ) -> None:
-    """Learn measurement noise of the sensor and process noise of the scene from innovations."""
+    """Learn measurement noise of the sensor and process noise of the scene from innovations.
+
+    Boxes at the edge of the picture teach nothing, and the next box of such a track has none before it.
+    """
     tracks, i, seen = state.tracks, pairs.track, pairs.innovation
-    size = singer.box_size(tracks.mean[i])
-    e = noise_learning.normalised_innovations(seen.y[i, pairs.box], seen.S[i], size, c)
-    sure = (tracks.evidence.detections[i] > c.noise_hits) & (tracks.real[i] > c.report)
+    size = singer.expected_size(tracks.mean[i])
+    e = noise_learning.normalised_innovations(seen.y[i, pairs.box], seen.S[i, pairs.box], size, c)
+    whole = ~scan.edges[pairs.box].any(axis=(1, 2))
+    sure = whole & (tracks.evidence.detections[i] > c.noise_hits) & (tracks.real[i] > c.report)
     if sure.any():
         share = noise_learning.share_of_scan(int(sure.sum()), clock.period_s, c)
         k, known = scan.sensor, i[sure]
@@ -249,18 +269,21 @@ def learn_noise(
             state.process_noise, e[sure], *before, share, c
         )
     innovation, has_innovation = tracks.innovation.copy(), tracks.has_innovation.copy()
-    innovation[i], has_innovation[i] = e, True
+    innovation[i[whole]], has_innovation[i] = e[whole], whole
     state.tracks = replace(tracks, innovation=innovation, has_innovation=has_innovation)
 
 
 def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> None:
     """Update the states of tracks by their boxes: heavy tails, and sides that are cut, have less weight."""
     tracks, i, seen = state.tracks, pairs.track, pairs.innovation
-    y, size = seen.y[i, pairs.box], singer.box_size(tracks.mean[i])
-    R = box_sides.measured_variance(y, seen.S[i], seen.side_variance[i], size, c)
+    y, S, gone = seen.y[i, pairs.box], seen.S[i, pairs.box], seen.gone[i, pairs.box]
+    R = box_sides.measured_variance(
+        y, S, seen.side_variance[i], singer.expected_size(tracks.mean[i]), gone, c
+    )
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
-    m, P, y = box_sides.uncover(mean[i], covariance[i], y, seen.S[i], c)
-    mean[i], covariance[i] = box_sides.update(m, P, y, box_sides.measurement_matrix(singer.box_size(m)), R)
+    m, P, y = box_sides.uncover(mean[i], covariance[i], y, S, gone, c)
+    H = box_sides.measurement_matrix(singer.expected_size(m))
+    mean[i], covariance[i] = box_sides.update(m, P, y, H, R)
     state.tracks = replace(tracks, mean=mean, covariance=covariance)
 
 

@@ -37,9 +37,9 @@ def begin_tracks(
         among[logits[None] <= logits[:, None]] = 0.0
         overlap = np.maximum(overlap, among.max(axis=1))
     evidence = Evidence.of_births(clock.t, scan.sensor, state.num_sensors, logits, overlap, clock.weight)
-    noise = float(state.log_side_variance[scan.sensor])
+    noise = float(state.log_side_variance[scan.sensor]), state.log_scene_variance
     ids = np.arange(state.next_id, state.next_id + len(free), dtype=np.int64)
-    new = ReferenceTracks.begun(ids, *box_sides.initial_state(boxes, noise, c), evidence)
+    new = ReferenceTracks.begun(ids, *box_sides.initial_state(boxes, scan.edges[free], *noise, c), evidence)
     state.tracks, state.next_id = tracks.append(new), state.next_id + len(free)
 
 

@@ -12,13 +12,14 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters import gap_survival, sensor_offsets
 from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.singer import MOTION
 from jeat_graph.smoothers.state_rts import FilterRecord, smooth
 from jeat_graph.tracking.reference import step
 from jeat_graph.tracking.reference_life import begin_anew
 from jeat_graph.tracking.reference_state import ReferenceState, SensorScan, declare_sensor, initial_state
 
-#: Numbers of the state of a track: two axes of five.
-_WIDTH = 10
+#: Numbers of what is told of a track: two axes of five.
+_WIDTH = 2 * MOTION
 #: After so long without any scan all tracks are over (s).
 _LONGEST_SILENCE_S = 300.0
 #: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time, number of
@@ -145,7 +146,7 @@ class ReferenceModel:
         nothing = np.zeros(0)
         self._answer = Answer(
             _rows(t, told.track_id, told.mean, told.covariance, told.real, told.used),
-            told.covariance.reshape(-1, 5 * _WIDTH),
+            told.covariance[..., :MOTION, :MOTION].reshape(-1, MOTION * _WIDTH),
             np.concatenate([*done.takers, np.zeros(0, np.int64)]),
             tracks.track_id,
             (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
@@ -257,6 +258,11 @@ class ReferenceModel:
         """Return the number of smoothed rows that have become final: none before the end."""
         return 0
 
+    def boxes_end_at_edge(self) -> bool:
+        """Return whether boxes end at the edge of the picture more often than they reach beyond it."""
+        state = self._state
+        return state.picture_known and bool(state.boxes_at_edge.sum() >= state.boxes_beyond.sum())
+
     def smoothed(self) -> ModelRows:
         """Return the smoothed rows so far, of each track from its first to its last detection.
 
@@ -320,6 +326,8 @@ class ReferenceModel:
             "log_side_variance": state.log_side_variance,
             "leftovers": state.leftovers,
             "offsets": sensor_offsets.offsets(state.offsets, state.log_side_variance, self.constants),
+            "boxes_at_edge": state.boxes_at_edge,
+            "boxes_beyond": state.boxes_beyond,
             "process_noise": tuple(state.process_noise),
         }
 
@@ -335,7 +343,7 @@ def _rows(
 ) -> ModelRows:
     """Return tracks (N,) at one time."""
     variance = np.diagonal(covariance, axis1=2, axis2=3)
-    flat = mean.reshape(-1, _WIDTH), variance.reshape(-1, _WIDTH)
+    flat = mean[..., :MOTION].reshape(-1, _WIDTH), variance[..., :MOTION].reshape(-1, _WIDTH)
     if called is None:
         called = [Called(track, -1, 0.0) for track in ids.tolist()]
     given, label = (np.array([one[k] for one in called], dtype=np.int64) for k in (0, 1))

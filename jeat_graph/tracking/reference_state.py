@@ -36,9 +36,9 @@ class ReferenceTracks(ArrayTable):
 
     Attributes:
         track_id: (N,) identities, from 1 on.
-        mean: (N, 2, 5) per axis position (px), velocity (px/s), acceleration (px/s²), ln size, its rate
-            (1/s).
-        covariance: (N, 2, 5, 5).
+        mean: (N, 2, 7) per axis position (px), velocity (px/s), acceleration (px/s²), ln size, its rate
+            (1/s), lasting errors of position (px) and of ln size.
+        covariance: (N, 2, 7, 7).
         presence: (N, 3) probabilities of visible, hidden, gone.
         recent_hits, recent_misses: (N, S) with a memory, for the track's own P_D, in correlation times.
         last_box: (N, S, 4) the last box of each sensor (left, top, right, bottom in px), as it was given; 0
@@ -112,12 +112,14 @@ class SensorScan(NamedTuple):
         logits: (M,) of their scores.
         alike: (N, M) ln of how much more likely each box is of a track than of another by what both look
             like, of the first N tracks; None where nothing is known of that.
+        edges: (M, 2, 2) by axis and side which end at the edge of the picture; `correct_boxes` writes it.
     """
 
     sensor: int
     boxes: FloatArray
     logits: FloatArray
     alike: FloatArray | None = None
+    edges: BoolArray = np.zeros((0, 2, 2), dtype=np.bool_)
 
 
 @dataclass
@@ -141,6 +143,7 @@ class ReferenceState:
         leftovers: (S,) running mean of boxes a scan that no track takes. `count_clutter`
         period_s: (S,) running mean of the time between two scans (s); NaN before the second. `look`
         last_look_s: (S,) time of the last scan (s); NaN before it. `look`
+        boxes_at_edge, boxes_beyond: (S,) boxes that end at the edge of the picture, and beyond it. `look`
         repetition: of S sensors, which boxes come again. `look`
         even_logit: (S,) logit of the score at which the user says that a box is as likely real as not; NaN
             where it is learnt.
@@ -163,6 +166,8 @@ class ReferenceState:
     leftovers: FloatArray
     period_s: FloatArray
     last_look_s: FloatArray
+    boxes_at_edge: FloatArray
+    boxes_beyond: FloatArray
     repetition: tuple[RepeatCounts, ...]
     even_logit: FloatArray
     sees_changes: BoolArray
@@ -172,6 +177,11 @@ class ReferenceState:
         """Time that the tracks are predicted to (s)."""
         assert self.t is not None, "tracks are predicted before anything else"
         return self.t
+
+    @property
+    def log_scene_variance(self) -> float:
+        """Mean of ln ρ² of the sensors that have looked: the scale of the errors that last."""
+        return float(self.log_side_variance[~np.isnan(self.last_look_s)].mean())
 
     @property
     def num_sensors(self) -> int:
@@ -199,6 +209,8 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         leftovers=none,
         period_s=none,
         last_look_s=none,
+        boxes_at_edge=none,
+        boxes_beyond=none,
         repetition=(),
         even_logit=none,
         sees_changes=np.zeros(0, dtype=np.bool_),
@@ -218,6 +230,8 @@ def declare_sensor(
     state.leftovers = np.append(state.leftovers, c.first_leftovers)
     state.period_s = np.append(state.period_s, np.nan)
     state.last_look_s = np.append(state.last_look_s, np.nan)
+    state.boxes_at_edge = np.append(state.boxes_at_edge, 0.0)
+    state.boxes_beyond = np.append(state.boxes_beyond, 0.0)
     state.repetition = (*state.repetition, score_calibration.no_repetition())
     state.even_logit = np.append(state.even_logit, even_logit)
     state.sees_changes = np.append(state.sees_changes, sees_changes)

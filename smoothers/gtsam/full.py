@@ -13,14 +13,12 @@ from jeat_graph.smoothers.gtsam.scaling import unscale_mean
 from jeat_graph.smoothers.gtsam.window import GtsamError
 
 
-def solve_track(
-    prior_cov: FloatArray, segments: Sequence[SegmentRows], reference: FloatArray
-) -> FloatArray:
+def solve_track(prior_cov: FloatArray, factors: Sequence[FloatArray], reference: FloatArray) -> FloatArray:
     """Return the means of the states at the ends of a track's segments, given all its measurements.
 
     Args:
         prior_cov: (3, 3) covariance of the first state, along either axis; its mean is its reference.
-        segments: the rows of each segment.
+        factors: (6, 8) of each segment (`elimination`).
         reference: (B + 1, 2, 3) what the states between B segments are counted from.
 
     Returns:
@@ -31,8 +29,8 @@ def solve_track(
     """
     graph = LinearGraph(reference.shape[-1])
     graph.add_prior(0, *prior_rows(prior_cov))
-    for key, rows in enumerate(segments):
-        graph.add_segment(key, rows)
+    for key, factor in enumerate(factors):
+        graph.add_segment(key, SegmentRows.of(factor))
     try:
         means = unscale_mean(graph.solve(len(reference)), reference)
     except RuntimeError as error:

@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal, multivariate_t
 
 from jeat_graph.association import likelihood_ratio
-from jeat_graph.filters import box_sides
+from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.model_constants import ModelConstants
 
 C = ModelConstants()
+#: Three boxes, no side of which lies at the edge of the picture.
+WHOLE = np.zeros((3, 2, 2), dtype=bool)
 
 
 def best_sum(ratio):
@@ -47,12 +49,12 @@ def test_the_density_is_a_mixture_of_t_and_normal_and_cut_sides():
     boxes = np.array(
         [[200.0, 300.0, 300.0, 360.0], [203.0, 297.0, 306.0, 365.0], [230.0, 300.0, 300.0, 360.0]]
     )
-    mean, P = box_sides.initial_state(boxes[:1], 2.0 * np.log(0.06), C)
-    seen = box_sides.innovations(mean, P, boxes, 2.0 * np.log(0.06), C)
+    mean, P = box_sides.initial_state(boxes[:1], WHOLE[:1], *2 * [2.0 * np.log(0.06)], C)
+    seen = box_sides.innovations(mean, P, boxes, WHOLE, 2.0 * np.log(0.06), C)
     size = np.array([[100.0, 60.0]])
     got = likelihood_ratio.sides_log_density(seen, size, C)
     S = np.zeros((4, 4))
-    S[:2, :2], S[2:, 2:] = seen.S[0]
+    S[:2, :2], S[2:, 2:] = seen.S[0, 0]
     wide = S + C.outlier_std**2 * 6000.0 * np.eye(4)
     y = seen.y[0].reshape(3, 4)
     t, normal = (
@@ -84,11 +86,11 @@ def test_a_box_in_doubt_fits_a_track_in_doubt():
 
 def test_outside_the_gates_no_pair_is_made():
     box = np.array([[200.0, 300.0, 300.0, 360.0]])
-    mean, P = box_sides.initial_state(box, 2.0 * np.log(0.06), C)
+    mean, P = box_sides.initial_state(box, WHOLE[:1], *2 * [2.0 * np.log(0.06)], C)
     # Far off; cut to a third from the left; grown on all sides at once.
     moved = np.array([[400.0, 400.0, 400.0, 400.0], [66.0, 0.0, 0.0, 0.0], [-90.0, -90.0, 90.0, 90.0]])
     seen = box + moved
-    innovation = box_sides.innovations(mean, P, seen, 2.0 * np.log(0.06), C)
+    innovation = box_sides.innovations(mean, P, seen, WHOLE, 2.0 * np.log(0.06), C)
     density = likelihood_ratio.sides_log_density(innovation, np.array([[100.0, 60.0]]), C)
     assert np.isfinite(density).tolist() == [[False, True, False]]
     ratio = likelihood_ratio.pair_log_ratio(
@@ -97,3 +99,24 @@ def test_outside_the_gates_no_pair_is_made():
     np.testing.assert_allclose(ratio, [[8.0, 0.0]])
     track, box = likelihood_ratio.assign(ratio)
     assert (track.tolist(), box.tolist()) == ([0], [0])
+
+
+def test_a_box_that_the_edge_has_cut_fits_its_track():
+    """Of an object of 100 px 20 px show: elsewhere that is another box, at the edge it is the track's own."""
+    box = np.array([[200.0, 300.0, 300.0, 360.0]])
+    mean, P = box_sides.initial_state(box, WHOLE[:1], *2 * [2.0 * np.log(0.06)], C)
+    P[..., singer.VELOCITY, singer.VELOCITY] = 0.0
+    cut = np.array([[280.0, 300.0, 300.0, 360.0]])
+    edges = np.array([[[True, False], [False, False]]])
+    inside, at_edge = (
+        likelihood_ratio.sides_log_density(
+            box_sides.innovations(mean, P, cut, e, 2.0 * np.log(0.06), C), np.array([[100.0, 60.0]]), C
+        )[0, 0]
+        for e in (WHOLE[:1], edges)
+    )
+    # It needs no occluder, which is rare.
+    assert at_edge > inside + 1.0
+    # A side at the edge that lies further out than expected is measured as any other.
+    wider = np.array([[195.0, 300.0, 300.0, 360.0]])
+    out = box_sides.innovations(mean, P, wider, edges, 2.0 * np.log(0.06), C)
+    assert not out.gone.any()

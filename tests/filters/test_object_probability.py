@@ -134,7 +134,8 @@ def test_hits_of_one_sensor_alone_say_nothing_of_what_repeats(first, more, score
 @given(hits=st.floats(0, 1e3), misses=st.floats(0, 1e3), silent=st.floats(0, 1e4))
 def test_silence_of_one_sensor_is_bounded(hits, misses, silent):
     """The evidence of misses is bounded: a sensor may be blind to the object (g) or the false one (1 − c)."""
-    sensors, bound = sensors_of(2), np.log((1.0 - C.shared_false) / C.unseen_share)
+    sensors = sensors_of(2)
+    bound = np.log((1.0 - C.shared_false) / sensors.unseen[1])
     scores = [1.0, np.nan]
     before = op.posterior(evidence_of([hits, 0.0], [misses, 0.0], scores, gained=1e4), sensors, C)
     told = op.posterior(evidence_of([hits, 0.0], [misses, silent], scores, gained=1e4), sensors, C)

@@ -118,7 +118,9 @@ def test_the_cameras_shift_and_scale_are_found_in_spite_of_a_stray(theta):
     rng = np.random.default_rng(1)
     centre = rng.uniform(100, 1800, (12, 2)) * [1.0, 0.55]
     boxes = np.concatenate([centre - 30.0, centre + 30.0], axis=1)
-    mean, covariance = box_sides.initial_state(boxes, 2.0 * np.log(0.03), C)
+    mean, covariance = box_sides.initial_state(
+        boxes, np.zeros((len(boxes), 2, 2), bool), *2 * [2.0 * np.log(0.03)], C
+    )
     picture = (1920.0, 1080.0)
     moved = centre + theta[:2] + theta[2] * (centre - np.array(picture) / 2.0)
     moved[0] += 25.0
@@ -132,12 +134,38 @@ def test_the_cameras_shift_and_scale_are_found_in_spite_of_a_stray(theta):
     np.testing.assert_allclose(motion.theta / [0.6, 0.6, 1e-3], theta / np.array([0.6, 0.6, 1e-3]), atol=1.0)
     assert learnt.shift != prior.shift
     np.testing.assert_allclose(learnt.last, motion.theta / 0.1)
-    after, _ = camera_motion.compensate(mean, covariance, motion, picture)
+    after, _ = camera_motion.compensate(mean, covariance, motion, picture, 0.1, C)
     np.testing.assert_allclose(after[1:, :, singer.POSITION], moved[1:], atol=1.5)
+    # What lasts of it is the tracks' own.
+    share = (1.0 - np.exp(-0.1 / C.camera_time_s)) / 0.1
+    gone = after[..., singer.POSITION] - mean[..., singer.POSITION]
+    np.testing.assert_allclose(after[..., singer.VELOCITY], share * gone)
+    np.testing.assert_allclose(after[..., singer.GROWTH], share * motion.theta[2])
+
+
+def test_a_camera_that_goes_on_and_tracks_that_move_do_not_grow_against_each_other():
+    """Tracks that stand, and believe to move by as much as the camera moves back: soon neither does."""
+    picture, dt = (1920.0, 1080.0), 0.1
+    centre = np.random.default_rng(2).uniform(300, 900, (10, 2))
+    boxes = np.concatenate([centre - 30.0, centre + 30.0], axis=1)
+    none, noise = np.zeros((10, 2, 2), bool), 2.0 * np.log(0.03)
+    mean, covariance = box_sides.initial_state(boxes, none, noise, noise, C)
+    mean[..., singer.VELOCITY] = 100.0
+    covariance[..., singer.VELOCITY, singer.VELOCITY] = 1.0  # so sure of it that boxes will not tell it
+    prior = camera_motion.CameraVariance(0.04, 1e-4, np.zeros(3))
+    for _ in range(20):
+        mean = (singer.discretise(dt, C).F @ mean[..., None])[..., 0]
+        motion, prior = camera_motion.estimate(mean, covariance, boxes, noise, picture, dt, prior, C)
+        assert motion is not None
+        mean, _ = camera_motion.compensate(mean, covariance, motion, picture, dt, C)
+    assert np.abs(mean[..., singer.VELOCITY]).max() < 10.0
+    assert np.abs(motion.theta[:2]).max() < 2.0
 
 
 def test_one_track_tells_nothing_of_the_camera():
-    mean, covariance = box_sides.initial_state(np.array([[0.0, 0.0, 9.0, 9.0]]), -5.0, C)
+    mean, covariance = box_sides.initial_state(
+        np.array([[0.0, 0.0, 9.0, 9.0]]), np.zeros((1, 2, 2), bool), -5.0, -5.0, C
+    )
     prior = camera_motion.initial_variance(C)
     motion, learnt = camera_motion.estimate(
         mean, covariance, np.ones((0, 4)), -5.0, (100.0, 100.0), 0.1, prior, C
@@ -150,7 +178,9 @@ def test_a_row_of_like_objects_is_not_taken_for_its_neighbours_when_the_camera_g
     """Parked cars 40 px apart, and a camera that pans by 36 px a scan: the nearest box is a neighbour's."""
     left = np.arange(8)[:, None] * 40.0 + 200.0
     boxes = np.concatenate([left, np.full((8, 1), 100.0), left + 30.0, np.full((8, 1), 120.0)], axis=1)
-    mean, covariance = box_sides.initial_state(boxes, 2.0 * np.log(0.03), C)
+    mean, covariance = box_sides.initial_state(
+        boxes, np.zeros((len(boxes), 2, 2), bool), *2 * [2.0 * np.log(0.03)], C
+    )
     seen = boxes + np.array([36.0, 0.0, 36.0, 0.0])
     picture = (640.0, 240.0)
     lost = camera_motion.CameraVariance(0.04, 1e-6, np.zeros(3))

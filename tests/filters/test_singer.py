@@ -20,7 +20,7 @@ DRIVEN = {"position": 0, "jerk": 2, "size": 3, "growth": 4}
 
 @pytest.mark.parametrize("dt", STEPS)
 def test_transition_solves_the_differential_equation(dt):
-    start = np.array([3.0, -2.0, 5.0, 0.3, 0.7])
+    start = np.array([3.0, -2.0, 5.0, 0.3, 0.7, 1.5, -0.2])
     A = singer.drift(C)
     end = solve_ivp(lambda _, x: A @ x, (0.0, dt), start, rtol=1e-11, atol=1e-12).y[:, -1]
     np.testing.assert_allclose(singer.discretise(dt, C).F @ start, end, rtol=1e-8, atol=1e-9)
@@ -30,7 +30,7 @@ def test_transition_solves_the_differential_equation(dt):
 @pytest.mark.parametrize("noise", DRIVEN)
 def test_process_noise_is_the_integral_of_what_is_driven(dt, noise):
     def integrand(s):
-        F, term = np.eye(5), np.eye(5)
+        F, term = np.eye(singer.STATES), np.eye(singer.STATES)
         for n in range(1, 60):  # the exponential's series, not the function that the code uses
             term = term @ singer.drift(C) * (s / n)
             F = F + term
@@ -69,7 +69,7 @@ def test_a_step_of_a_day_is_finite():
 
 def test_no_time_changes_nothing():
     model = singer.discretise(0.0, C)
-    np.testing.assert_array_equal(model.F, np.eye(5))
+    np.testing.assert_array_equal(model.F, np.eye(singer.STATES))
     assert not any(part.any() for part in model[1:])
 
 
@@ -87,9 +87,10 @@ def test_constant_velocity_in_space_is_predicted_exactly(growth):
     c = replace(C, velocity_time_s=1e9, acceleration_time_s=1e9, growth_time_s=1e9)
     dt, Z, X, Y = 0.15, 20.0, 3.0, -1.5
     speed = np.array([0.7, 0.2, -growth * Z])  # dX/dt, dY/dt, dZ/dt: g = -Z'/Z
-    mean = np.zeros((1, 2, 5))
+    mean = np.zeros((1, 2, singer.STATES))
     for axis, place in enumerate((X, Y)):
-        mean[0, axis] = place / Z, (speed[axis] - place / Z * speed[2]) / Z, 0.0, np.log(1.0 / Z), growth
+        velocity = (speed[axis] - place / Z * speed[2]) / Z
+        mean[0, axis, : singer.MOTION] = place / Z, velocity, 0.0, np.log(1.0 / Z), growth
     F = singer.in_perspective(singer.discretise(dt, c).F, mean, dt, c)
     got = (F @ mean[..., None])[..., 0]
     later = Z + speed[2] * dt
@@ -101,4 +102,32 @@ def test_constant_velocity_in_space_is_predicted_exactly(growth):
         tolerance = abs(mean[0, axis, 1]) * dt * (growth * dt) ** 2
         assert got[0, axis, 0] == pytest.approx(want[0], abs=tolerance + 1e-9)
         assert got[0, axis, 1] == pytest.approx(want[1], rel=3.0 * (growth * dt) ** 2 + 1e-7)
-        np.testing.assert_allclose(got[0, axis, 3:], want[3:], rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(got[0, axis, 3 : singer.MOTION], want[3:], rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("dt", STEPS)
+def test_errors_that_last_keep_their_variance_and_forget_exponentially(dt):
+    size, log_variance = np.array([[100.0, 60.0]]), 2.0 * np.log(0.06)
+    position, extent = singer.lasting_error(size, log_variance, C)
+    mean, covariance = np.zeros((1, 2, singer.STATES)), np.zeros((1, 2, singer.STATES, singer.STATES))
+    mean[..., singer.LOG_SIZE], mean[..., singer.POSITION_ERROR] = np.log(size), 4.0
+    covariance[..., singer.POSITION_ERROR, singer.POSITION_ERROR] = position
+    covariance[..., singer.SIZE_ERROR, singer.SIZE_ERROR] = extent
+    model, q = singer.discretise(dt, C), singer.initial_process_noise(C)
+    got, grown = singer.predict(mean, covariance, model, model.F[None, None], q, log_variance, C)
+    np.testing.assert_allclose(got[..., singer.POSITION_ERROR], 4.0 * np.exp(-dt / C.error_time_s))
+    np.testing.assert_allclose(grown[..., singer.POSITION_ERROR, singer.POSITION_ERROR], position)
+    np.testing.assert_allclose(grown[..., singer.SIZE_ERROR, singer.SIZE_ERROR], extent)
+    np.testing.assert_array_equal(got[..., singer.POSITION], 0.0)
+
+
+def test_errors_of_centre_and_size_are_those_of_two_sides():
+    """Brute force: two sides that err independently, and what centre and ln size get of it."""
+    side = 0.01 * (0.5 * np.sqrt(100.0 * 60.0) + 0.5 * 100.0)
+    rng = np.random.default_rng(0)
+    left, right = rng.normal(0.0, side, (2, 200_000))
+    position, extent = singer.lasting_error(
+        np.array([[100.0, 60.0]]), 2.0 * np.log(0.01), replace(C, error_share=1.0)
+    )
+    assert position[0, 0] == pytest.approx(((left + right) / 2.0).var(), rel=0.02)
+    assert extent[0, 0] == pytest.approx(np.log((100.0 + right - left) / 100.0).var(), rel=0.02)

@@ -12,9 +12,10 @@ import numpy as np
 
 from benchmarks.speed_worker import resident_mib
 from jeat_graph import Tracker, load_config
-from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
-from jeat_graph.smoothers.measurements import measurements
-from jeat_graph.smoothers.track_data import Prior
+from jeat_graph.smoothers.fixed_lag import FixedLagChain
+
+#: The tracker whose smoother is GTSAM's with a fixed lag.
+LAGGED = load_config("paper", ["smoother.engine=fixed-lag"])
 
 
 def traffic(num):
@@ -51,7 +52,7 @@ class OneVehicle:
     """A tracker with its smoother, and one vehicle that stays in the picture."""
 
     def __init__(self):
-        self.tracker, self.steps, self._rng = Tracker(load_config("default")), 0, np.random.default_rng(0)
+        self.tracker, self.steps, self._rng = Tracker(LAGGED), 0, np.random.default_rng(0)
 
     def drive(self):
         """Take the next 4.8 s; returns their processor time (s)."""
@@ -89,7 +90,7 @@ def long_track():
 
 def short_tracks():
     """Memory (MiB) while 150 vehicles come and go one after the other, with their smoothers."""
-    tracker, rng, t, memory = Tracker(load_config("default")), np.random.default_rng(1), 0.0, []
+    tracker, rng, t, memory = Tracker(LAGGED), np.random.default_rng(1), 0.0, []
     for track in range(150):
         x, y = rng.uniform(200.0, 1000.0), rng.uniform(100.0, 600.0)
         for k in range(40):
@@ -103,20 +104,21 @@ def short_tracks():
             tracker.drain_smoothed()
             gc.collect()
             memory.append(resident_mib())
-    left = len(tracker._smoothers._smoothers._histories)
+    left = len(tracker._smoothers._paths)
     return {"memory": memory, "left": left, **tracker.smoother_counts}
 
 
 def short_windows():
-    """Memory (MiB) while windows of half a second are filled and finished, one reading per 50 lives."""
+    """Memory (MiB) while windows of a few states are filled and forgotten, one reading per 50 lives."""
     rng, memory = np.random.default_rng(0), []
-    t = np.arange(0.01, 0.5, 0.008)
     for life in range(250):
-        z = 600.0 + rng.normal(0.0, 2.0, (len(t), 2))
-        mean, cov = z[0][:, None] * [1, 0, 0], np.tile(np.diag([9.0, 2500, 900]), (2, 1, 1))
-        smoother = FixedLagSmoother(Prior(0.0, mean, cov))
-        smoother.feed(measurements(t, z, np.full((len(t), 2), 4.0), np.full(len(t), 100.0)))
-        smoother.finish()
+        chain = FixedLagChain(np.zeros((2, 3)), np.diag([9.0, 2500.0, 900.0]))
+        for number in range(6):
+            factor = np.concatenate([np.eye(6), rng.normal(size=(6, 2))], axis=1)
+            factor[:3, 3:6] = -np.eye(3)
+            chain.append([factor], [np.zeros((2, 3))])
+            chain.means(range(number, number + 2))
+            chain.leave(1)
         if life % 50 == 49:
             gc.collect()
             memory.append(resident_mib())

@@ -18,21 +18,7 @@ from jeat_graph.io.events.evt3_writer import Evt3Writer
 from jeat_graph.io.events.opening import open_events
 from jeat_graph.io.tables import read_table
 from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
-from jeat_graph.smoothers.engine import make_smoother
-from jeat_graph.smoothers.fixed_lag import FixedLagSmoother
-from jeat_graph.smoothers.measurements import measurements
-from jeat_graph.smoothers.track_data import Prior, TrackData
-
-
-def sampled(seconds):
-    """A vehicle that moves evenly, measured at 100 Hz with an error of 2 px."""
-    t = np.arange(0.01, seconds, 0.01)
-    truth = np.stack([600 + 20 * np.sin(t), 300 + 10 * np.cos(t)], axis=1)
-    z = truth + np.random.default_rng(0).normal(0.0, 2.0, truth.shape)
-    mean = np.array([[600.0, 0.0, 0.0], [310.0, 0.0, 0.0]])
-    cov = np.tile(np.diag([9.0, 2500.0, 900.0]), (2, 1, 1))
-    measured = measurements(t, z, np.full(z.shape, 4.0), np.full(len(t), 10.0))
-    return TrackData.from_measurements(Prior(0.0, mean, cov), measured)
+from tests.performance.jobs import OneVehicle
 
 
 def frames(num, objects=50):
@@ -75,51 +61,17 @@ def test_a_step_grows_no_faster_than_linearly_to_500_tracks():
     pytest.fail(f"{least[500]:.6f} s at 500 tracks, {least[100]:.6f} s at 100")
 
 
-def test_rts_is_at_least_five_times_cheaper_than_fixed_lag(least):
-    track = sampled(10.0)
-    measured = track.measurements()
-
-    def life(engine):
-        smoother = make_smoother(engine, track.prior, correlation_time=track.correlation_time)
-        for i in range(0, len(track.z), 48):  # as many at a time as the tracker hands over
-            smoother.feed(measured[i : i + 48])
-            smoother.departed()
-        smoother.finish()
-
-    fixed_lag, rts = least(
-        lambda: life("fixed-lag"), lambda: life("rts"), until=lambda fixed_lag, rts: 5 * rts <= fixed_lag
-    )
-    assert 5 * rts <= fixed_lag
-
-
 def test_a_window_costs_no_more_after_a_minute(least):
-    turns, piece = 40, 500  # 5 s
-    track = sampled(60.0 + 5.0 * (turns + 2))
-    measured = track.measurements()
-
-    class Fed:
-        """A smoother and how much of the track it has seen."""
-
-        def __init__(self, pieces):
-            self.smoother = FixedLagSmoother(track.prior, correlation_time=track.correlation_time)
-            self.position, self.slots = 0, []
-            for _ in range(pieces):
-                self.feed()
-
-        def feed(self):
-            for i in range(self.position, self.position + piece, 6):
-                self.smoother.feed(measured[i : min(i + 6, self.position + piece)])
-                self.smoother.departed()
-            self.position += piece
-            self.slots.append(self.smoother._gtsam._smoother.getFactors().size())
-
-    young, old = [Fed(1) for _ in range(turns + 1)], Fed(12)
+    young, old = [OneVehicle() for _ in range(9)], OneVehicle()
+    for one in young:
+        one.drive()
+    for _ in range(13):
+        old.drive()
     early, late = least(
-        lambda: young.pop().feed(), old.feed, until=lambda early, late: late < 1.5 * early, most=turns
+        lambda: young.pop().drive(), old.drive, until=lambda early, late: late < 1.5 * early, most=8
     )
     assert late < 1.5 * early
-    assert max(old.slots[2:]) <= 1.2 * old.slots[1]
-    assert old.smoother.rebuilds == 0
+    assert old.tracker.smoother_counts["fallbacks"] == 0
 
 
 def test_judging_takes_no_longer_per_frame_where_there_are_more(least):

@@ -14,7 +14,9 @@ R = 4.0
 
 def white_jerk(dt: float) -> tuple[np.ndarray, np.ndarray]:
     F = np.array([[1.0, dt, dt**2 / 2], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
-    G = np.array([[dt**5 / 20, dt**4 / 8, dt**3 / 6], [dt**4 / 8, dt**3 / 3, dt**2 / 2], [dt**3 / 6, dt**2 / 2, dt]])
+    G = np.array(
+        [[dt**5 / 20, dt**4 / 8, dt**3 / 6], [dt**4 / 8, dt**3 / 3, dt**2 / 2], [dt**3 / 6, dt**2 / 2, dt]]
+    )
     return F, 50.0 * G
 
 
@@ -61,7 +63,9 @@ def dense(track: FilteredTrack, z, axis: int, last: int) -> tuple[np.ndarray, np
         if track.sensor[k] >= 0 and k <= last:
             add(H @ at[k], np.array([[1.0 / R]]), z[k, axis : axis + 1])
     cov = np.linalg.inv(A)
-    return (cov @ b).reshape(-1, 3), np.stack([cov[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(len(track))])
+    return (cov @ b).reshape(-1, 3), np.stack(
+        [cov[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(len(track))]
+    )
 
 
 @pytest.mark.parametrize("lag", [0, 1, 4, 11])
@@ -75,7 +79,9 @@ def test_states_at_a_lag_are_the_least_squares_solution_of_what_had_been_measure
             want, spread = dense(track, z, axis, int(until[k]))
             std = np.sqrt(np.diag(spread[k]))
             np.testing.assert_allclose((mean[k, axis] - want[k]) / std, 0.0, atol=1e-6)
-            np.testing.assert_allclose(covariance[k, axis] / np.outer(std, std), spread[k] / np.outer(std, std), atol=1e-6)
+            np.testing.assert_allclose(
+                covariance[k, axis] / np.outer(std, std), spread[k] / np.outer(std, std), atol=1e-6
+            )
 
 
 def test_all_of_it_is_the_pass_over_the_whole_track():

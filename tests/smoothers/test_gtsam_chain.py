@@ -1,4 +1,6 @@
-"""GTSAM on segments, with a lag and over whole tracks: the least squares solution, whatever the segments are."""
+"""GTSAM on segments, with a lag and over whole tracks: the least squares solution, wherever they are cut."""
+
+import itertools
 
 import numpy as np
 import pytest
@@ -6,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.smoothers.fixed_lag import FixedLagChain
-from jeat_graph.smoothers.gtsam.elimination import eliminate
+from jeat_graph.smoothers.gtsam.elimination import SegmentRows, eliminate, join
 from jeat_graph.smoothers.gtsam.full import solve_track
 from jeat_graph.smoothers.gtsam.scaling import scale
 from jeat_graph.smoothers.gtsam.window import GtsamError
@@ -18,11 +20,12 @@ def segments_of(chains, track, ends):
     mean, _ = chains.filtered(*track)
     mean[0] = prior
     rows = []
-    for first, last in zip(ends[:-1], ends[1:], strict=True):
+    for first, last in itertools.pairwise(ends):
         here = slice(first, last + 1)
         told = information[here].copy()
         told[0] = 0.0
-        rows += eliminate(F[first:last], Q[first:last], mean[None, here], z[None, here], told[None])
+        steps = F[None, first:last], Q[None, first:last]
+        rows += list(eliminate(*steps, mean[None, here], z[None, here], told[None]))
     return rows, mean[ends]
 
 
@@ -30,7 +33,8 @@ def test_a_segment_of_two_keys_is_its_motion_and_its_measurement(chains):
     F, Q, z, information, prior = chains.drawn(1, 2)
     information[1] = 0.25
     reference = np.stack([prior, prior + 1.0])
-    (rows,) = eliminate(F, Q, reference[None], z[None], information[None])
+    (factor,) = eliminate(F[None], Q[None], reference[None], z[None], information[None])
+    rows = SegmentRows.of(factor)
     D, x = np.tile(scale(3), 2), np.random.default_rng(0).normal(size=(2, 2, 3))
     y = [D * (x[k] - reference[k]).ravel() for k in range(2)]
     residual = rows.A0 @ y[0] + rows.A1 @ y[1] - rows.b
@@ -54,7 +58,7 @@ def test_the_window_knows_all_that_came_and_keeps_what_left(chains):
     chain = FixedLagChain(reference[0], chains.PRIOR_COV)
     left = 0
     for number in range(1, len(ends)):
-        chain.append(rows[number - 1], reference[number])
+        chain.append(rows[number - 1 : number], reference[number : number + 1])
         until = ends[number] + 1
         F, Q, z, information, prior = track
         seen = F[: until - 1], Q[: until - 1], z[:until], information[:until], prior
@@ -71,11 +75,20 @@ def test_what_has_left_cannot_be_asked_for(chains):
     rows, reference = segments_of(chains, track, [0, 10, 20, 30])
     chain = FixedLagChain(reference[0], chains.PRIOR_COV)
     for number in (1, 2):
-        chain.append(rows[number - 1], reference[number])
+        chain.append(rows[number - 1 : number], reference[number : number + 1])
     chain.leave(1)
-    chain.append(rows[2], reference[3])
+    chain.append(rows[2:], reference[3:])
     with pytest.raises(GtsamError):
         chain._window.means([0], reference[:1])
+
+
+def test_two_segments_joined_are_one(chains):
+    track = chains.drawn(6, 21)
+    (whole,), _ = segments_of(chains, track, [0, 20])
+    (first, second), _ = segments_of(chains, track, [0, 7, 20])
+    one, other = whole[:, :6], join(first[None], second[None])[0][:, :6]
+    information = one.T @ one
+    assert np.abs(other.T @ other - information).max() < 1e-8 * np.abs(information).max()
 
 
 @settings(max_examples=15, deadline=None)

@@ -1,4 +1,4 @@
-"""States of a segment given its last one: with that one's smoothed state they are the least squares solution."""
+"""States of a segment given its last one: with that one smoothed they are the least squares solution."""
 
 import numpy as np
 import pytest

@@ -35,11 +35,13 @@ def test_smoothed_states_are_the_least_squares_solution():
     rng = np.random.default_rng(4)
     steps = [0.0, 0.1, 0.05, 0.3, 0.1, 0.02]
     models = [singer.discretise(dt, C) for dt in steps]
-    D, H, R = 5, np.array([[1.0, 0, 0, -20.0, 0], [1.0, 0, 0, 20.0, 0]]), np.diag([4.0, 9.0])
+    D, R = singer.STATES, np.diag([4.0, 9.0])
+    H = np.array([[1.0, 0, 0, -20.0, 0, 1.0, -20.0], [1.0, 0, 0, 20.0, 0, 1.0, 20.0]])
     z = rng.normal(size=(len(steps), 2)) * 5
-    noises = [400.0 * (m.jerk + m.position) + m.growth + m.size for m in models]
-    shifts = [np.array([s, 0.0, 0.0, 0.01 * s, 0.0]) for s in rng.normal(size=len(steps))]
-    prior = np.zeros(D), np.diag([100.0, 400.0, 900.0, 0.04, 0.09])
+    errors = np.diag([0.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.002])
+    noises = [400.0 * (m.jerk + m.position) + m.growth + m.size + errors for m in models]
+    shifts = [np.array([s, 0.0, 0.0, 0.01 * s, 0.0, 0.0, 0.0]) for s in rng.normal(size=len(steps))]
+    prior = np.zeros(D), np.diag([100.0, 400.0, 900.0, 0.04, 0.09, 6.0, 0.004])
     records, mean, P = [], *prior
     for k, model in enumerate(models):
         if k:

@@ -177,7 +177,9 @@ def test_an_update_is_the_joseph_form(seed):
     assert (np.linalg.eigvalsh(cov[0]) > 0).all()
 
 
-@pytest.mark.parametrize(("scale", "nis", "after"), [(1.0, 2.0, 1.0), (1.0, 4.0, 1.1), (0.5, 0.0, 0.5), (4.9, 99.0, 5.0)])
+@pytest.mark.parametrize(
+    ("scale", "nis", "after"), [(1.0, 2.0, 1.0), (1.0, 4.0, 1.1), (0.5, 0.0, 0.5), (4.9, 99.0, 5.0)]
+)
 def test_the_noise_follows_equation_6(scale, nis, after):
     found = kalman.adapted(np.array([scale]), np.array([nis]), PaperConfig())
     assert found[0] == pytest.approx(after)

@@ -29,10 +29,10 @@ def tracker(**settings):
 
 
 def covariances(made):
-    """Covariances (N, 2, 5, 5) of the living tracks."""
+    """Covariances (N, 2, 7, 7) of the living tracks."""
     model = made._model
     state = model.tracks()["covariance"] if ENGINE == "core" else model._state.tracks.covariance
-    return state.reshape(-1, 2, 5, 5)
+    return state.reshape(-1, 2, 7, 7)
 
 
 def scene(seed=0, times=50, period=0.1, vehicles=4):
@@ -307,3 +307,35 @@ def test_what_the_boxes_of_two_detectors_differ_by_is_learnt(wider):
         breath.append(np.mean(two.boxes[:, 2] - one.boxes[:, 2]) if len(one) == len(two) == 4 else np.nan)
     assert made.num_tracks == made.num_born == 4
     assert abs(np.nanmean(breath[50:])) < 0.01 * 80.0
+
+
+# The edge of the picture.
+
+
+def leaving(beyond, times=40):
+    """A vehicle that leaves the picture on the right; its detector's boxes end there, or reach beyond."""
+    width, batches = float(IMAGE[0]), []
+    for k in range(times):
+        left, right = width - 400.0 + 12.0 * k, width - 280.0 + 12.0 * k
+        right = right if beyond else min(right, width)
+        if min(right, width) - left < 12.0:
+            break
+        batches.append([(0.1 * k, "cam", [[left, 300.0, right - left, 80.0]], [0.95])])
+    return batches
+
+
+def test_a_vehicle_that_leaves_the_picture_keeps_one_identity_and_ends_at_the_edge():
+    batches = leaving(beyond=False)
+    _, tables = run(batches)
+    assert {int(i) for table in tables[1:] for i in table.track_id} == {1}
+    for batch, table in zip(batches[5:], tables[5:], strict=True):
+        np.testing.assert_allclose(table.boxes[0], batch[0][2][0], atol=6.0)
+    # The centre goes on, beyond the middle of the part that shows.
+    box = tables[-1].boxes[0]
+    assert tables[-1].mean[0, 0] > box[0] + box[2] / 2.0 + 30.0
+
+
+def test_boxes_that_reach_beyond_the_picture_are_written_as_they_are():
+    _, tables = run(leaving(beyond=True))
+    far = [table.boxes[0, 0] + table.boxes[0, 2] for table in tables if len(table)]
+    assert far[-1] > IMAGE[0] + 30.0

@@ -61,9 +61,8 @@ inline double cut_log_density(const std::array<double, 4>& y, const SidesExpecte
 }
 
 // ln p(y) of a pair, or kImpossible where it lies outside every gate.
-inline double sides_log_density(const Sides& box, const SidesExpected& expected, const ScanTerms& terms,
+inline double sides_log_density(const std::array<double, 4>& y, const SidesExpected& expected, const ScanTerms& terms,
                                 const ModelConstants& c) {
-    const auto y = filters::side_innovations(box, expected.box);
     const double d2 = filters::squared_distance(y, expected.S), wide = filters::squared_distance(y, expected.wide);
     const double cut = cut_log_density(y, expected, c);
     double out = cut;

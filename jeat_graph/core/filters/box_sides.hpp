@@ -12,7 +12,7 @@
 namespace jeat::filters {
 
 inline constexpr double kLog2Pi = 1.8378770664093454;
-inline constexpr double kLeastProbability = 0.02, kLeastWeight = 1e-3, kOutwards = -20.0, kMostDistance = 200.0;
+inline constexpr double kLeastProbability = 0.02, kLeastWeight = 1e-3, kOutwards = -20.0, kMostDistance = 200.0, kUnmeasured = 100.0;
 
 // A symmetric 2 x 2 matrix.
 struct Pair2 {
@@ -41,15 +41,17 @@ inline double side_variance(double size, double both, double rho2, const ModelCo
 inline SidesExpected expected_sides(const double* mean, const double* covariance, double rho2,
                                     const ModelConstants& c) {
     SidesExpected out;
-    out.size = {exp_of(mean[kLogSize]), exp_of(mean[kStates + kLogSize])};
-    out.box = corners(mean, out.size[0], out.size[1]);
+    out.box = expected_corners(mean);
+    out.size = {out.box.width(), out.box.height()};
     const double area = out.size[0] * out.size[1], both = std::sqrt(area);
     const double extra = square(c.outlier_std) * area;
     out.log_det = out.log_det_wide = 0.0;
     for (int axis = 0; axis < 2; ++axis) {
         const double* const P = covariance + axis * kMatrix;
-        const double w = out.size[axis], a = P[kPosition * kStates + kPosition];
-        const double b = w * P[kPosition * kStates + kLogSize], d = w * w / 4.0 * P[kLogSize * kStates + kLogSize];
+        const auto sum = [P](int i, int j, int k, int l) { return P[i * kStates + k] + P[i * kStates + l] + P[j * kStates + k] + P[j * kStates + l]; };
+        const double w = out.size[axis], a = sum(kPosition, kPositionError, kPosition, kPositionError);
+        const double b = w * sum(kPosition, kPositionError, kLogSize, kSizeError);
+        const double d = w * w / 4.0 * sum(kLogSize, kSizeError, kLogSize, kSizeError);
         const double R = side_variance(w, both, rho2, c);
         out.variance[axis] = R;
         out.S[axis] = {a - b + d + R, a - d, a + b + d + R};
@@ -64,6 +66,37 @@ inline SidesExpected expected_sides(const double* mean, const double* covariance
 inline std::array<double, 4> side_innovations(const Sides& box, const Sides& expected) {
     return {box.left - expected.left, box.right - expected.right, box.top - expected.top,
             box.bottom - expected.bottom};
+}
+
+// Which sides of a box lie at the edge of the picture: left, right, top, bottom.
+struct Edges {
+    std::array<bool, 4> at{};
+
+    bool any() const { return at[0] || at[1] || at[2] || at[3]; }
+};
+
+inline Edges edges_of(const Sides& box, double width, double height, const ModelConstants& c) {
+    const auto near = [&](double a, double b) { return std::abs(a - b) <= c.edge_px; };
+    return {{near(box.left, 0.0), near(box.right, width), near(box.top, 0.0), near(box.bottom, height)}};
+}
+
+// Sides at the edge that lie inwards of what is expected: the edge has cut them, and they measure nothing.
+inline Edges unmeasured(const std::array<double, 4>& y, const Edges& edges) {
+    return {{edges.at[0] && y[0] > 0.0, edges.at[1] && y[1] < 0.0, edges.at[2] && y[2] > 0.0, edges.at[3] && y[3] < 0.0}};
+}
+
+// What is expected of a box whose sides are cut by the edge: they lie anywhere within about the object.
+inline SidesExpected with_cut(SidesExpected expected, const Edges& cut, const ModelConstants& c) {
+    expected.log_det = expected.log_det_wide = 0.0;
+    for (int axis = 0; axis < 2; ++axis) {
+        const double V = square(c.edge_std * expected.size[axis]);
+        const double left = cut.at[2 * axis] ? V : 0.0, right = cut.at[2 * axis + 1] ? V : 0.0;
+        expected.S[axis] = expected.S[axis].plus(left, right);
+        expected.wide[axis] = expected.wide[axis].plus(left, right);
+        expected.log_det += log_of(expected.S[axis].determinant());
+        expected.log_det_wide += log_of(expected.wide[axis].determinant());
+    }
+    return expected;
 }
 
 inline double squared_distance(const std::array<double, 4>& y, const std::array<Pair2, 2>& S) {
@@ -92,12 +125,14 @@ inline void update_axis(double* mean, double* P, double left, double right, doub
     const double half = size / 2.0;
     double PHl[kStates], PHr[kStates];
     for (int i = 0; i < kStates; ++i) {
-        const double p = P[i * kStates + kPosition], l = half * P[i * kStates + kLogSize];
+        const double p = P[i * kStates + kPosition] + P[i * kStates + kPositionError];
+        const double l = half * (P[i * kStates + kLogSize] + P[i * kStates + kSizeError]);
         PHl[i] = p - l;
         PHr[i] = p + l;
     }
-    const Pair2 S{PHl[kPosition] - half * PHl[kLogSize] + Rl, PHr[kPosition] - half * PHr[kLogSize],
-                  PHr[kPosition] + half * PHr[kLogSize] + Rr};
+    const auto centre = [](const double* PH) { return PH[kPosition] + PH[kPositionError]; };
+    const auto extent = [half](const double* PH) { return half * (PH[kLogSize] + PH[kSizeError]); };
+    const Pair2 S{centre(PHl) - extent(PHl) + Rl, centre(PHr) - extent(PHr), centre(PHr) + extent(PHr) + Rr};
     const double det = S.determinant();
     Matrix A{};
     double Kl[kStates], Kr[kStates];
@@ -106,8 +141,8 @@ inline void update_axis(double* mean, double* P, double left, double right, doub
         Kr[i] = (PHr[i] * S.ll - PHl[i] * S.lr) / det;
         mean[i] += Kl[i] * left + Kr[i] * right;
         A[i * kStates + i] = 1.0;
-        A[i * kStates + kPosition] -= Kl[i] + Kr[i];
-        A[i * kStates + kLogSize] += half * (Kl[i] - Kr[i]);
+        for (const int k : {kPosition, kPositionError}) A[i * kStates + k] -= Kl[i] + Kr[i];
+        for (const int k : {kLogSize, kSizeError}) A[i * kStates + k] += half * (Kl[i] - Kr[i]);
     }
     Matrix AP;
     for (int i = 0; i < kStates; ++i)
@@ -124,6 +159,15 @@ inline void update_axis(double* mean, double* P, double left, double right, doub
         }
 }
 
+// P grows by d^2 along one side: by [1/2, along] of [p, l].
+inline void vary_side(double* P, double d, double along) {
+    const double V = square(d);
+    P[kPosition * kStates + kPosition] += V / 4.0;
+    P[kPosition * kStates + kLogSize] += V * along / 2.0;
+    P[kLogSize * kStates + kPosition] += V * along / 2.0;
+    P[kLogSize * kStates + kLogSize] += V * square(along);
+}
+
 // Where it is likelier that a side has been cut so far and now shows further out than that both sides measure as
 // before, nothing is known of that side: the state takes it as it is measured, and P grows by d^2 along it.
 inline void uncover(double* mean, double* P, double& left, double& right, const Pair2& S, double size,
@@ -135,35 +179,32 @@ inline void uncover(double* mean, double* P, double& left, double& right, const 
         const double alone = -0.5 * square(other[side]) / variance[side] - 0.5 * (log_of(variance[side]) + kLog2Pi) -
                              log_of(size) + log_of(c.uncovered_share);
         if (alone <= both) continue;
-        const double sign = side == 0 ? -1.0 : 1.0, whole = exp_of(mean[kLogSize]) + out[side];
+        const double sign = side == 0 ? -1.0 : 1.0, whole = exp_of(mean[kLogSize] + mean[kSizeError]) + out[side];
         mean[kPosition] += sign * out[side] / 2.0;
-        mean[kLogSize] = log_of(whole);
+        mean[kLogSize] = log_of(whole) - mean[kSizeError];
         (side == 0 ? left : right) = 0.0;
-        const double along = sign / whole, V = square(out[side]);
-        P[kPosition * kStates + kPosition] += V / 4.0;
-        P[kPosition * kStates + kLogSize] += V * along / 2.0;
-        P[kLogSize * kStates + kPosition] += V * along / 2.0;
-        P[kLogSize * kStates + kLogSize] += V * square(along);
+        vary_side(P, out[side], sign / whole);
     }
 }
 
 // Update a track by a box: heavy tails, and sides that are cut, have less weight.
 inline void update(double* mean, double* covariance, const std::array<double, 4>& y, const SidesExpected& expected,
-                   const ModelConstants& c) {
+                   const Edges& gone, const ModelConstants& c) {
     const double heavy = 1.0 / student_weight(squared_distance(y, expected.S), c);
     for (int axis = 0; axis < 2; ++axis) {
         double left = y[2 * axis], right = y[2 * axis + 1];
         double *const m = mean + axis * kStates, *const P = covariance + axis * kMatrix;
         const auto cut = cut_probabilities(left, right, expected.S[axis], expected.size[axis], c);
         const double R = expected.variance[axis] * (cut[0] + cut[1] > 0.5 ? 1.0 : heavy);
-        uncover(m, P, left, right, expected.S[axis], expected.size[axis], c);
-        update_axis(m, P, left, right, exp_of(m[kLogSize]), R / std::max(1.0 - cut[0], kLeastProbability),
-                    R / std::max(1.0 - cut[1], kLeastProbability));
+        if (!gone.at[2 * axis] && !gone.at[2 * axis + 1]) uncover(m, P, left, right, expected.S[axis], expected.size[axis], c);
+        const double none = square(kUnmeasured * expected.size[axis]);
+        update_axis(m, P, left, right, exp_of(m[kLogSize] + m[kSizeError]), gone.at[2 * axis] ? none : R / std::max(1.0 - cut[0], kLeastProbability),
+                    gone.at[2 * axis + 1] ? none : R / std::max(1.0 - cut[1], kLeastProbability));
     }
 }
 
 // The state of a track that begins at a box.
-inline void initial_state(const Sides& box, double rho2, const ModelConstants& c, double* mean,
+inline void initial_state(const Sides& box, const Edges& edges, double rho2, double scene_rho2, const ModelConstants& c, double* mean,
                           double* covariance) {
     std::fill(mean, mean + kMean, 0.0);
     std::fill(covariance, covariance + kCovariance, 0.0);
@@ -173,9 +214,14 @@ inline void initial_state(const Sides& box, double rho2, const ModelConstants& c
         const double R = side_variance(size[axis], both, rho2, c);
         mean[axis * kStates + kPosition] = centre[axis];
         mean[axis * kStates + kLogSize] = log_of(size[axis]);
+        const LastingError error(size[axis], both, scene_rho2, c);
         const double variance[] = {R / 2.0, square(c.velocity_std * both), square(c.acceleration_std * both),
-                                   2.0 * R / square(size[axis]), square(c.growth_std)};
+                                   2.0 * R / square(size[axis]), square(c.growth_std), error.position, error.size};
         for (int i = 0; i < kStates; ++i) covariance[axis * kMatrix + i * kStates + i] = variance[i];
+        // How far it reaches beyond the edge nobody knows.
+        for (int side = 0; side < 2; ++side)
+            if (edges.at[2 * axis + side])
+                vary_side(covariance + axis * kMatrix, c.edge_birth * size[axis], (side ? 1.0 : -1.0) / size[axis]);
     }
 }
 

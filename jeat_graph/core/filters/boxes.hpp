@@ -39,6 +39,14 @@ inline Sides corners(const double* mean) {
     return corners(mean, exp_of(mean[kLogSize]), exp_of(mean[kStates + kLogSize]));
 }
 
+// The box that a detector is expected to give: with the error that lasts.
+inline Sides expected_corners(const double* mean) {
+    const double w = exp_of(mean[kLogSize] + mean[kSizeError]);
+    const double h = exp_of(mean[kStates + kLogSize] + mean[kStates + kSizeError]);
+    const double x = mean[kPosition] + mean[kPositionError], y = mean[kStates + kPosition] + mean[kStates + kPositionError];
+    return {x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0};
+}
+
 // Boxes by their left sides: which of them may reach into an interval, without a look at the rest.
 class ByLeft {
 public:

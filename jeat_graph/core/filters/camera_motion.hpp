@@ -139,7 +139,7 @@ inline CameraMotion estimate_camera(const std::vector<CameraTrack>& tracks, cons
     }
     out.known = true;
     out.variance = {covariance[0], covariance[4]};
-    if (dt > 0.0) prior.last = {out.theta[0] / dt, out.theta[1] / dt, out.theta[2] / dt};
+    prior.last = {out.theta[0] / dt, out.theta[1] / dt, out.theta[2] / dt};
     const double keep = c.camera_memory;
     const double shift = (square(out.theta[0]) + covariance[0] + square(out.theta[1]) + covariance[4]) / 2.0;
     prior.shift = clamp(keep * prior.shift + (1.0 - keep) * shift / square(typical), square(c.camera_shift_bounds.low),
@@ -149,12 +149,16 @@ inline CameraMotion estimate_camera(const std::vector<CameraTrack>& tracks, cons
     return out;
 }
 
-inline void compensate(double* mean, double* covariance, const CameraMotion& motion, double width, double height) {
+inline void compensate(double* mean, double* covariance, const CameraMotion& motion, double width, double height,
+                       double lasting) {
     const double middle[] = {width / 2.0, height / 2.0}, scale = motion.theta[2];
     for (int axis = 0; axis < 2; ++axis) {
         double* const m = mean + axis * kStates;
-        m[kPosition] += motion.theta[axis] + scale * (m[kPosition] - middle[axis]);
+        const double shift = motion.theta[axis] + scale * (m[kPosition] - middle[axis]);
+        m[kPosition] += shift;
+        m[kVelocity] += lasting * shift;
         m[kLogSize] += scale;
+        m[kGrowth] += lasting * scale;
         covariance[axis * kMatrix] += motion.variance[axis];
     }
 }

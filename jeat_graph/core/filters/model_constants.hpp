@@ -18,6 +18,8 @@ struct Bounds {
     JEAT_ONE(velocity_time_s) \
     JEAT_ONE(acceleration_time_s) \
     JEAT_ONE(growth_time_s) \
+    JEAT_ONE(error_time_s) \
+    JEAT_ONE(error_share) \
     JEAT_ONE(jerk) \
     JEAT_ONE(growth_noise) \
     JEAT_ONE(position_walk) \
@@ -38,6 +40,9 @@ struct Bounds {
     JEAT_ONE(most_uncovered) \
     JEAT_ONE(outlier_share) \
     JEAT_ONE(outlier_std) \
+    JEAT_ONE(edge_px) \
+    JEAT_ONE(edge_std) \
+    JEAT_ONE(edge_birth) \
     JEAT_ONE(offset_count) \
     JEAT_ONE(offset_clip) \
     JEAT_ONE(offset_age_s) \
@@ -109,6 +114,7 @@ struct Bounds {
     JEAT_PAIR(camera_shift_bounds) \
     JEAT_PAIR(camera_scale_bounds) \
     JEAT_ONE(camera_memory) \
+    JEAT_ONE(camera_time_s) \
     JEAT_ONE(report) \
     JEAT_ONE(inside_share) \
     JEAT_ONE(rival) \

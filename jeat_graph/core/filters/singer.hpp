@@ -10,7 +10,9 @@
 
 namespace jeat::filters {
 
-inline constexpr int kStates = 5, kPosition = 0, kVelocity = 1, kAcceleration = 2, kLogSize = 3, kGrowth = 4;
+inline constexpr int kStates = 7, kPosition = 0, kVelocity = 1, kAcceleration = 2, kLogSize = 3, kGrowth = 4;
+// What lasts of a detector's error: of the position, and of ln size. States before them are those of motion.
+inline constexpr int kPositionError = 5, kSizeError = 6, kMotion = 5;
 // The state of a track: two axes; its covariance: one matrix for each, row by row.
 inline constexpr int kMean = 2 * kStates, kMatrix = kStates * kStates, kCovariance = 2 * kMatrix;
 
@@ -83,6 +85,7 @@ inline Discretised discretise(double dt, const ModelConstants& c) {
     A[kVelocity * kStates + kVelocity] = -1.0 / c.velocity_time_s;
     A[kAcceleration * kStates + kAcceleration] = -1.0 / c.acceleration_time_s;
     A[kGrowth * kStates + kGrowth] = -1.0 / c.growth_time_s;
+    A[kPositionError * kStates + kPositionError] = A[kSizeError * kStates + kSizeError] = -1.0 / c.error_time_s;
     double fastest = 1.0;
     for (const double a : A) fastest = std::max(fastest, std::abs(a));
     const int n = halvings(dt, fastest);
@@ -116,6 +119,17 @@ inline Discretised discretise(double dt, const ModelConstants& c) {
     return out;
 }
 
+// Variance of the lasting error of the position of one axis (px^2), and of ln size; rho2: of the sides' other errors.
+struct LastingError {
+    double position, size;
+
+    LastingError(double length, double both, double rho2, const ModelConstants& c) {
+        const double side = c.error_share * rho2 * square(0.5 * both + 0.5 * length);
+        position = side / 2.0;
+        size = 2.0 * side / square(length);
+    }
+};
+
 inline double object_size(const double* mean) { return exp_of(0.5 * (mean[kLogSize] + mean[kStates + kLogSize])); }
 
 // The transition of a track that moves at constant speed in space: a = 2 g v, dg/dt = g^2 (g the rate of ln size).
@@ -135,10 +149,11 @@ inline Matrix in_perspective(const Matrix& F, const double* mean, double dt, con
 
 // The densities themselves, but of the jerk the root.
 struct Densities {
-    double root_jerk, growth, position, size;
+    double root_jerk, growth, position, size, rho2;
 
-    explicit Densities(const ProcessNoise& q)
-        : root_jerk(exp_of(q.jerk / 2.0)), growth(exp_of(q.growth)), position(exp_of(q.position)), size(exp_of(q.size)) {}
+    Densities(const ProcessNoise& q, double side_variance)
+        : root_jerk(exp_of(q.jerk / 2.0)), growth(exp_of(q.growth)), position(exp_of(q.position)), size(exp_of(q.size)),
+          rho2(side_variance) {}
 };
 
 // m <- F m, P <- F P F' + Q.
@@ -173,6 +188,10 @@ inline void predict(double* mean, double* covariance, const Discretised& step, d
                        by_walk * step.position[at];
                 P[at] = P[j * kStates + i] = sum;
             }
+        const LastingError error(exp_of(mean[axis * kStates + kLogSize]), size, q.rho2, c);
+        const double forgotten = 1.0 - square(F[kPositionError * kStates + kPositionError]);
+        P[kPositionError * kStates + kPositionError] += forgotten * error.position;
+        P[kSizeError * kStates + kSizeError] += forgotten * error.size;
     }
     std::copy(predicted.begin(), predicted.end(), mean);
 }

@@ -48,9 +48,10 @@ struct Rows {
         share.push_back(called.share);
         real.push_back(probability);
         used.push_back(sensors);
-        mean.insert(mean.end(), state, state + kMean);
         for (int axis = 0; axis < 2; ++axis)
-            for (int k = 0; k < kStates; ++k) variance.push_back(covariance[axis * kMatrix + k * kStates + k]);
+            mean.insert(mean.end(), state + axis * kStates, state + axis * kStates + filters::kMotion);
+        for (int axis = 0; axis < 2; ++axis)
+            for (int k = 0; k < filters::kMotion; ++k) variance.push_back(covariance[axis * kMatrix + k * kStates + k]);
     }
 };
 

@@ -101,6 +101,7 @@ public:
 
     // Keep what the last step gave the smoother, for hand_over.
     Record record() { return std::move(record_); }
+    bool boxes_end_at_edge() const { return now_.state.boxes_end_at_edge(); }
 
     // Tell the smoother of a step that nothing can come before any more; of the last one without a record.
     void hand_over(const Record* record, std::optional<In<std::int64_t>> given, std::optional<In<std::int64_t>> label,
@@ -151,7 +152,7 @@ public:
     }
 
     Table rows() const { return table(now_.answer.rows); }
-    Out2<double> covariances() const { return array_of(now_.answer.covariance, kCovariance); }
+    Out2<double> covariances() const { return array_of(now_.answer.covariance, 2 * kMotion * kMotion); }
     Out<std::int64_t> takers() const { return array_of(now_.answer.takers); }
     Out<std::int64_t> living() const { return array_of(now_.answer.living); }
     std::tuple<Out<double>, Out<double>, Out<double>> fit() const {
@@ -191,6 +192,11 @@ public:
         std::vector<double> leftovers;
         for (const Sensor& sensor : state.sensors) leftovers.push_back(sensor.leftovers);
         out["leftovers"] = array_of(leftovers);
+        std::vector<double> at_edge, beyond;
+        for (const Sensor& sensor : state.sensors)
+            at_edge.push_back(sensor.boxes_at_edge), beyond.push_back(sensor.boxes_beyond);
+        out["boxes_at_edge"] = array_of(at_edge);
+        out["boxes_beyond"] = array_of(beyond);
         out["noise_share"] = state.belief.noise_share;
         out["log_side_variance"] = array_of(state.log_side_variance);
         std::vector<double> offsets;
@@ -232,13 +238,17 @@ private:
             if (!reported_[i]) continue;
             const double* const covariance = tracks.covariance_of(i);
             answer.rows.add(t, {tracks.track_id[i]}, tracks.mean_of(i), covariance, tracks.real[i], tracks.used[i]);
-            answer.covariance.insert(answer.covariance.end(), covariance, covariance + kCovariance);
+            for (int axis = 0; axis < 2; ++axis)
+                for (int k = 0; k < kMotion; ++k) {
+                    const double* const row = covariance + axis * kMatrix + k * kStates;
+                    answer.covariance.insert(answer.covariance.end(), row, row + kMotion);
+                }
         }
     }
 
     static Table table(const Rows& rows) {
-        return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, kMean),
-                              array_of(rows.variance, kMean), array_of(rows.real), array_of(rows.used),
+        return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, 2 * kMotion),
+                              array_of(rows.variance, 2 * kMotion), array_of(rows.real), array_of(rows.used),
                               array_of(rows.label), array_of(rows.share));
     }
 
@@ -260,7 +270,7 @@ void bind(nb::module_& module) {
              "Identities of the tracks after it, before any ended (N,).")
         .def("scans", &scans_of,
              "Scan by scan, in the order they were taken in: index of the sensor (K,) and number of tracks after it (K,);\n"
-             "of these, one scan after the other, mean (E, 10) and covariance (E, 50) before the update, and after it.");
+             "of these, one scan after the other, mean (E, 14) and covariance (E, 98) before the update, and after it.");
     nb::class_<Moment>(module, "Moment", "All that the next step depends on; the smoother is no part of it.")
         .def("identities", [](const Moment& moment) { return array_of(moment.state.tracks.track_id); },
              "Identities of the living tracks (N,).")
@@ -310,6 +320,8 @@ void bind(nb::module_& module) {
         .def("living", &Model::living, "Identities of the tracks of the last step, before any ended (N,).")
         .def("size", &Model::size, "Number of living tracks.")
         .def("born", &Model::born, "Number of tracks started so far.")
+        .def("boxes_end_at_edge", &Model::boxes_end_at_edge,
+             "Whether boxes end at the edge of the picture more often than they reach beyond it.")
         .def("smoothed", &Model::smoothed, "Smoothed rows so far, columns as those of rows.")
         .def("drain", &Model::drain, "Smoothed rows that have become final; they are forgotten.")
         .def("finish", &Model::finish, "The same, all tracks being ended.")

@@ -73,6 +73,7 @@ struct Tracks {
 // One sensor, beside what SensorBelief and OffsetSums have of it.
 struct Sensor {
     double leftovers;                                             // count_clutter
+    double boxes_at_edge = 0.0, boxes_beyond = 0.0;               // look
     double period_s = std::numeric_limits<double>::quiet_NaN();   // look
     double last_look_s = std::numeric_limits<double>::quiet_NaN();
     RepeatCounts repetition;                                      // look
@@ -106,6 +107,13 @@ struct State {
         camera.shift = square(c.camera_shift_std);
         camera.scale = square(c.camera_scale_std);
         belief.noise_share = c.noise_share;
+    }
+
+    // Whether boxes end at the edge of the picture more often than they reach beyond it.
+    bool boxes_end_at_edge() const {
+        double at = 0.0, beyond = 0.0;
+        for (const Sensor& sensor : sensors) at += sensor.boxes_at_edge, beyond += sensor.boxes_beyond;
+        return picture_known && at >= beyond;
     }
 
     void declare_sensor(double even_logit, bool sees_changes) {

@@ -158,6 +158,12 @@ private:
                                   : kPeriodMemory * sensor.period_s + (1.0 - kPeriodMemory) * since;
         }
         sensor.last_look_s = t;
+        if (s_.picture_known)
+            for (const Sides& box : scan.boxes) {
+                const double out = std::max(std::max(-box.left, -box.top), std::max(box.right - s_.width, box.bottom - s_.height));
+                sensor.boxes_beyond += out > c_.edge_px;
+                sensor.boxes_at_edge += edges_of(box, s_.width, s_.height, c_).any();
+            }
         sensor.repetition.count(scan.boxes, scan.logits, c_);
         s_.belief.indifference[scan.sensor] =
             std::isnan(sensor.even_logit) ? sensor.repetition.indifference(c_) : -sensor.even_logit;
@@ -176,7 +182,7 @@ private:
             presence_step_ = presence_transition(static_cast<double>(ticks) / 1e6, c_);
         }
         if (dt <= 0.0) return;
-        const Densities densities(s_.process_noise);
+        const Densities densities(s_.process_noise, scene_side_variance());
         Tracks& tracks = s_.tracks;
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, densities, c_);
@@ -187,28 +193,40 @@ private:
     void correct_boxes(const Scan& scan) {
         const auto offset = s_.offsets.offset(scan.sensor, s_.log_side_variance, c_);
         boxes_.clear();
-        for (const Sides& box : scan.boxes) boxes_.push_back(corrected(box, offset));
+        edges_.clear();
+        const Sensor& sensor = s_.sensors[scan.sensor];
+        const bool ends = s_.picture_known && sensor.boxes_at_edge >= sensor.boxes_beyond;
+        for (const Sides& box : scan.boxes) {
+            boxes_.push_back(corrected(box, offset));
+            edges_.push_back(ends ? edges_of(box, s_.width, s_.height, c_) : Edges{});
+        }
     }
 
     void follow_camera(const Scan& scan) {
         Tracks& tracks = s_.tracks;
-        const double rho2 = exp_of(s_.log_side_variance[scan.sensor]);
+        const double rho2 = exp_of(s_.log_side_variance[scan.sensor]), dt = static_cast<double>(ticks_) / 1e6;
+        if (ticks_ <= 0) return;  // no time, no motion
         camera_tracks_.clear();
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             if (!(tracks.real[i] > c_.report) || !(tracks.evidence.detections[i] > kCameraDetections) ||
                 !(unseen_for(i) < kCameraAgeS))
                 continue;
             const double *m = tracks.mean_of(i), *P = tracks.covariance_of(i);
-            const double w = exp_of(m[kLogSize]), h = exp_of(m[kStates + kLogSize]), both = std::sqrt(w * h);
+            const Sides box = expected_corners(m);
+            const double w = box.width(), h = box.height(), both = std::sqrt(w * h);
             const double Rw = side_variance(w, both, rho2, c_), Rh = side_variance(h, both, rho2, c_);
-            const int l = kLogSize * kStates + kLogSize;
-            camera_tracks_.push_back({m[kPosition], m[kStates + kPosition], w, h, both, P[0] + Rw / 2.0,
-                                      P[kMatrix] + Rh / 2.0, P[l] + 2.0 * Rw / (w * w), P[kMatrix + l] + 2.0 * Rh / (h * h)});
+            const auto sum = [](const double* Q, int i, int j) { return Q[i * kStates + i] + 2.0 * Q[i * kStates + j] + Q[j * kStates + j]; };
+            camera_tracks_.push_back({(box.left + box.right) / 2.0, (box.top + box.bottom) / 2.0, w, h, both,
+                                      sum(P, kPosition, kPositionError) + Rw / 2.0,
+                                      sum(P + kMatrix, kPosition, kPositionError) + Rh / 2.0,
+                                      sum(P, kLogSize, kSizeError) + 2.0 * Rw / (w * w),
+                                      sum(P + kMatrix, kLogSize, kSizeError) + 2.0 * Rh / (h * h)});
         }
-        const CameraMotion motion = estimate_camera(camera_tracks_, boxes_, s_.width, s_.height, static_cast<double>(ticks_) / 1e6, s_.camera, c_);
+        const CameraMotion motion = estimate_camera(camera_tracks_, boxes_, s_.width, s_.height, dt, s_.camera, c_);
         if (!motion.known) return;
+        const double lasting = (1.0 - exp_of(-dt / c_.camera_time_s)) / dt;
         for (std::size_t i = 0; i < tracks.size(); ++i)
-            compensate(tracks.mean_of(i), tracks.covariance_of(i), motion, s_.width, s_.height);
+            compensate(tracks.mean_of(i), tracks.covariance_of(i), motion, s_.width, s_.height, lasting);
     }
 
     void associate(Scan& scan) {
@@ -239,7 +257,10 @@ private:
             const double real = std::max(tracks.real[i], association::kLeastPosterior);
             const double start = log_of(p / (1.0 - p)) - clutter, reach = association::reach(expected, c_);
             index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j) {
-                const double density = association::sides_log_density(boxes_[j], expected, terms, c_);
+                const auto y = side_innovations(boxes_[j], expected.box);
+                const Edges cut = unmeasured(y, edges_[j]);
+                const double density =
+                    association::sides_log_density(y, cut.any() ? with_cut(expected, cut, c_) : expected, terms, c_);
                 if (density <= association::kImpossible) return;
                 const double of_track = association::score_likelihood(real, q_[j], c_);
                 const double gain = start + density + log_of(of_track / of_clutter_[j]);
@@ -281,6 +302,10 @@ private:
             const auto& y = innovations_.emplace_back(side_innovations(boxes_[pairs_[k].column], expected_[i].box));
             const Innovation e = normalised_innovation(y, expected_[i], c_);
             double* const before = tracks.innovation.data() + i * 4;
+            if (edges_[pairs_[k].column].any()) {
+                tracks.has_innovation[i] = 0;
+                continue;
+            }
             if (tracks.evidence.detections[i] > c_.noise_hits && tracks.real[i] > c_.report)
                 sums.add(e, before, tracks.has_innovation[i], c_);
             std::copy(e.begin(), e.end(), before);
@@ -293,7 +318,9 @@ private:
         Tracks& tracks = s_.tracks;
         for (std::size_t m = 0; m < made_.size(); ++m) {
             const std::size_t i = pairs_[made_[m]].row;
-            filters::update(tracks.mean_of(i), tracks.covariance_of(i), innovations_[m], expected_[i], c_);
+            const Edges cut = unmeasured(innovations_[m], edges_[pairs_[made_[m]].column]);
+            filters::update(tracks.mean_of(i), tracks.covariance_of(i), innovations_[m],
+                            cut.any() ? with_cut(expected_[i], cut, c_) : expected_[i], cut, c_);
         }
     }
 
@@ -358,7 +385,7 @@ private:
                 if (scan.logits[free_[g]] > scan.logits[j])
                     overlap = std::max(overlap, intersection_over_union(boxes_[j], free_boxes_[g]));
             });
-            initial_state(boxes_[j], rho2, c_, tracks.mean_of(row), tracks.covariance_of(row));
+            initial_state(boxes_[j], edges_[j], rho2, scene_side_variance(), c_, tracks.mean_of(row), tracks.covariance_of(row));
             tracks.track_id[row] = s_.next_id++;
             tracks.used[row] = std::int64_t{1} << k;
             see_presence(tracks.presence.data() + row * kPresences);
@@ -472,6 +499,14 @@ private:
         const double* const m = s_.tracks.mean_of(row);
         return square(m[kVelocity]) + square(m[kStates + kVelocity]) < square(kLeastSpeed);
     }
+
+    // The geometric mean of the variances of sides of the sensors that have looked.
+    double scene_side_variance() const {
+        double sum = 0.0, number = 0.0;
+        for (std::size_t k = 0; k < s_.sensors.size(); ++k)
+            if (!std::isnan(s_.sensors[k].last_look_s)) sum += s_.log_side_variance[k], number += 1.0;
+        return exp_of(sum / std::max(number, 1.0));
+    }
     double unseen_for(std::size_t row) const { return s_.t - s_.tracks.evidence.last_s[row]; }
     double share_inside(std::size_t row) {
         const Sides box = corners(s_.tracks.mean_of(row));
@@ -491,6 +526,7 @@ private:
     std::vector<std::array<double, 4>> innovations_;  // of the pairs that are made
     std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
     std::vector<CameraTrack> camera_tracks_;
+    std::vector<Edges> edges_;  // of the scan's boxes
 };
 
 }  // namespace jeat::tracking

@@ -27,9 +27,9 @@ class Pairs(NamedTuple):
     detection: IntArray
     d2: FloatArray
 
-    def take(self, which: BoolArray) -> Pairs:
+    def take(self, which: BoolArray | IntArray) -> Pairs:
         """Return some of the pairs."""
-        return Pairs(*(column[which] for column in self))
+        return Pairs(self.row[which], self.detection[which], self.d2[which])
 
 
 def gated_pairs(tracks: PaperTracks, found: Found, gate: float) -> Pairs:
@@ -108,12 +108,12 @@ def second_views(pairs: Pairs) -> tuple[IntArray, IntArray]:
     served: list[Pairs] = []
     while len(pairs.row):
         # The nearest of each track, and who asks for it first.
-        pairs = Pairs(*(column[np.lexsort((pairs.d2, pairs.row))] for column in pairs))
+        pairs = pairs.take(np.lexsort((pairs.d2, pairs.row)))
         nearest = np.unique(pairs.row, return_index=True)[1]
         choice = pairs.detection[nearest]
         again = np.setdiff1d(np.arange(len(choice)), np.unique(choice, return_index=True)[1])
         count = int(again[0]) if len(again) else len(choice)
-        served.append(Pairs(*(column[nearest[:count]] for column in pairs)))
+        served.append(pairs.take(nearest[:count]))
         waiting = pairs.row > served[-1].row[-1]
         pairs = pairs.take(waiting & ~np.isin(pairs.detection, choice[:count]))
     if not served:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.gtsam.elimination import SegmentRows, eliminate
+from jeat_graph.smoothers.gtsam.elimination import eliminate
 from jeat_graph.smoothers.segments import Given, given_last
 from jeat_graph.tracking.paper.kalman import motion_model, size_model
 
@@ -30,7 +30,7 @@ class Piece(NamedTuple):
         size: states of the size given the last one.
         cov: (3, 3) filtered covariance of the last state.
         size_cov: (2, 2) that of its size.
-        rows: the factor between its ends for GTSAM, or None.
+        factor: (6, 8) between its ends for GTSAM, or None without it.
     """
 
     t: FloatArray
@@ -39,7 +39,7 @@ class Piece(NamedTuple):
     size: Given
     cov: FloatArray
     size_cov: FloatArray
-    rows: SegmentRows | None
+    factor: FloatArray | None
 
 
 def cut_segments(
@@ -65,22 +65,21 @@ def cut_segments(
     t, dt = t[last], np.diff(t[last])
     mean, cov = stacked("mean")[:, last], stacked("cov")[:, last]
     size_mean, size_cov = stacked("size_mean")[:, last], stacked("size_cov")[:, last]
-    used = np.zeros((len(identities), len(t)), dtype=np.int64)
-    np.bitwise_or.at(used, (slice(None), key), stacked("used"))
+    opens = np.flatnonzero(np.diff(key, prepend=-1))
+    used = np.bitwise_or.reduceat(stacked("used"), opens, axis=1)
     F, Q = motion_model(dt, engine.settings.jerk_px)
     motion = given_last(F, Q, mean, cov)
     size = given_last(*size_model(dt, engine.settings.size_rate_density), size_mean, size_cov)
-    rows: list[SegmentRows | None] = [None] * len(identities)
+    factors: list[FloatArray | None] = [None] * len(identities)
     if engine.gtsam and len(dt):
         told = np.stack([s.information[k] for s, k in zip(steps, at, strict=True)], axis=1)
         told[:, 0] = 0.0  # what the first step measured belongs to the segment before, or to the birth
         z = np.stack([s.z[k] for s, k in zip(steps, at, strict=True)], axis=1)
-        information, weighed = np.zeros((len(told), len(t))), np.zeros((len(told), len(t), 2))
-        np.add.at(information, (slice(None), key), told)
-        np.add.at(weighed, (slice(None), key), told[..., None] * z)
+        information = np.add.reduceat(told, opens, axis=1)
+        weighed = np.add.reduceat(told[..., None] * z, opens, axis=1)
         z = weighed / np.where(information > 0.0, information, 1.0)[..., None]
         origin = np.concatenate([np.stack(reference)[:, None], mean[:, 1:]], axis=1)
-        rows = list(eliminate(F, Q, origin, z, information))
+        factors = list(eliminate(F[None], Q[None], origin, z, information))
     return [
         Piece(
             t,
@@ -89,7 +88,7 @@ def cut_segments(
             Given(*(part[i] for part in size)),
             cov[i, -1],
             size_cov[i, -1],
-            rows[i],
+            factors[i],
         )
         for i in range(len(identities))
     ]

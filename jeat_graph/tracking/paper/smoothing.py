@@ -23,6 +23,8 @@ from jeat_graph.tracking.paper.table import boxes_at
 
 #: Steps in a segment: GTSAM solves for one state in so many. More would hardly be faster.
 STRIDE = 24
+# So many segments of a track become final at a time: the pass back over the lag's is the same for one.
+_TOGETHER = 2
 # A time that is an interval's begin but for rounding is in it.
 _ROUNDING = 1e-9
 
@@ -58,9 +60,9 @@ class StepTaken(NamedTuple):
 class PaperSmoothers:
     """Takes the steps of a tracker in and gives smoothed trajectories of the tracks that were confirmed.
 
-    A track has rows from its first to its last detection, those of the time before it was confirmed included. With
-    a fixed lag a row is final once measurements of `smoother.lag_s` have followed, else when its track has ended.
-    Final rows wait in memory until they are fetched.
+    A track has rows from its first to its last detection, also of the time before it was confirmed. With a
+    fixed lag a row is final when measurements of `smoother.lag_s` have followed, and at most 3 `STRIDE` steps
+    later; else when its track has ended. Final rows wait in memory until they are fetched.
 
     Args:
         config: settings of the smoother, the engine `paper` and the picture.
@@ -106,12 +108,9 @@ class PaperSmoothers:
             self._forget_steps()
 
     def drain(self, sensors: tuple[str, ...]) -> Trajectories:
-        """Return, and forget, final rows, in order of time over all calls."""
-        horizon = min((path.open_from for path in self._paths.values()), default=math.inf)
-        rows = Trajectories.concatenate([Trajectories.empty(sensors), *self._final])
-        ready = rows.t < horizon
-        self._final = [] if ready.all() else [rows.take(~ready)]
-        return _in_order(rows.take(ready))
+        """Return, and forget, final rows, in order of time."""
+        rows, self._final = Trajectories.concatenate([Trajectories.empty(sensors), *self._final]), []
+        return _in_order(rows)
 
     def smoothed(self, sensors: tuple[str, ...]) -> Trajectories:
         """Return all rows not drained yet, those too that may still change."""
@@ -125,9 +124,13 @@ class PaperSmoothers:
 
     def finish(self, sensors: tuple[str, ...]) -> Trajectories:
         """End all tracks and return all rows not drained yet."""
-        self._end(self._living.tolist())
-        self._living = np.zeros(0, dtype=np.int64)
+        self.begin_anew()
         return self.drain(sensors)
+
+    def begin_anew(self) -> None:
+        """End all tracks; times may begin again from any moment."""
+        self._end(self._living.tolist())
+        self._living, self._bin = np.zeros(0, dtype=np.int64), -math.inf
 
     def _end(self, ended: Iterable[int]) -> None:
         """Smooth what is left of tracks that are over since the newest step that is kept."""
@@ -169,13 +172,13 @@ class PaperSmoothers:
             self._wanted = [t for t in self._wanted if t >= oldest]
 
     def _depart(self, taken: StepTaken, due: list[int]) -> None:
-        """Let segments of some living tracks become final: those behind the lag, and before a last detection."""
+        """Let segments of living tracks become final: those behind the lag and before a last detection."""
         at = np.searchsorted(taken.ids, due)
         at = at[taken.tracks.confirmed[at]]
         until = np.minimum(taken.tracks.t_update[at], taken.t - self._lag_s)
         paths = [self._paths[identity] for identity in taken.ids[at].tolist()]
         counts = [path.before(t) for path, t in zip(paths, until.tolist(), strict=True)]
-        ready = [(path, count) for path, count in zip(paths, counts, strict=True) if count]
+        ready = [(path, count) for path, count in zip(paths, counts, strict=True) if count >= _TOGETHER]
         if not ready:
             return
         paths, counts = [path for path, _ in ready], [count for _, count in ready]
@@ -185,7 +188,7 @@ class PaperSmoothers:
         self._final += self._tables(paths, rows)
 
     def _remaining(self, identities: list[int]) -> list[Trajectories]:
-        """Return all rows that are not final of tracks of the newest step, up to each one's last detection."""
+        """Return all rows of tracks of the newest step that are not final, up to each last detection."""
         if not identities:
             return []
         newest = self._steps[-1]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from jeat_graph.config.schema import Config
@@ -11,17 +9,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.paper.state import PaperTracks
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class PaperPrediction(Trajectories):
-    """A table of predicted tracks, with the whole covariance of their motion.
-
-    Attributes:
-        cov: (N, 6, 6) covariance of `mean`, whose diagonal is `var`.
-    """
-
-    cov: FloatArray = ()  # type: ignore[assignment]
+from jeat_graph.tracking.prediction import Prediction
 
 
 def table_of(
@@ -66,10 +54,10 @@ def boxes_at(centre: FloatArray, size: FloatArray, config: Config) -> tuple[Floa
 
 def predicted(
     tracks: PaperTracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
-) -> PaperPrediction:
+) -> Prediction:
     """Write predicted tracks as a table with covariances; those that have left the picture are left out."""
     table = table_of(tracks, t, config, sensors, classes)
     kept = tracks.take(np.isin(tracks.track_id, table.track_id))
     cov = np.zeros((len(kept), 6, 6))
     cov[:, ::2, ::2] = cov[:, 1::2, 1::2] = kept.cov
-    return PaperPrediction(**vars(table), cov=cov)
+    return Prediction(**vars(table), cov=cov)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,10 +24,12 @@ from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names
+from jeat_graph.tracking.paper.kalman import predict
 from jeat_graph.tracking.paper.smoothing import PaperSmoothers, StepTaken
 from jeat_graph.tracking.paper.state import Found, PaperTracks
-from jeat_graph.tracking.paper.step import predict, step
-from jeat_graph.tracking.paper.table import PaperPrediction, predicted, table_of
+from jeat_graph.tracking.paper.step import step
+from jeat_graph.tracking.paper.table import predicted, table_of
+from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
 
@@ -87,6 +90,7 @@ class PaperTracker:
         self._next_id = 1
         self._classes: ClassTally | None = None
         self._taker: IntArray = np.zeros(0, dtype=np.int64)
+        self._looked: dict[str, float] = {}
         self._smoothers: PaperSmoothers | None = None
         if self.config.smoother.engine != "none":
             self._smoothers = PaperSmoothers(self.config)
@@ -149,6 +153,7 @@ class PaperTracker:
         taken = step(self._tracks, t, dt, found, self._next_id, self._settings)
         self._tracks, self._taker, self._t = taken.tracks, taken.taker, t
         self._next_id += taken.births
+        self._looked |= dict.fromkeys((scan.sensor for scan in batch), t)
         votes = Votes.of_batch(batch, np.arange(len(found), dtype=np.int64))
         if votes is not None or self._classes is not None:
             tally = self._classes or ClassTally.start()
@@ -164,6 +169,34 @@ class PaperTracker:
         """Give the smoothers what a step took in; in order of time, and once."""
         if self._smoothers is not None and taken is not None:
             self._smoothers.record(taken)
+
+    def meet(self, scans: Sequence[Scan]) -> None:
+        """Refuse sensors that are not declared and may not be; others are known from their first scan.
+
+        Raises:
+            UnknownSensorError: a name that is not declared and may not be.
+            DataError: too many sensors.
+        """
+        self._with_met(scans)
+
+    def begin_anew(self, t: float) -> None:
+        """End all tracks and let time go on from another moment, an earlier one too (s); identities go on."""
+        if self._t is not None:
+            if self._smoothers is not None:
+                self._smoothers.begin_anew()
+            self._tracks, self._t = self._tracks.take(np.zeros(0, dtype=np.int64)), t
+
+    def number_on_from(self, identity: int) -> None:
+        """Give no track that begins from now on an identity below this."""
+        self._next_id = max(self._next_id, identity)
+
+    def living(self) -> tuple[IntArray, int]:
+        """Return the identities (N,) of the living tracks, and that of the next one to be born."""
+        return self._tracks.track_id, self._next_id
+
+    def last_looks(self) -> dict[str, float]:
+        """Return when each declared sensor looked last (s), minus infinity for never."""
+        return dict.fromkeys(self.sensor_names, -math.inf) | self._looked
 
     def takers(self, count: int) -> IntArray:
         """Return the identity of the track that took each of the `count` detections (M,) of the last step."""
@@ -204,7 +237,7 @@ class PaperTracker:
         table = table_of(self._reported(), t, self.config, self.sensor_names, self._classes)
         return replace(table, instants=None if self._t is None else np.array([t]))
 
-    def predict(self, t: float) -> PaperPrediction:
+    def predict(self, t: float) -> Prediction:
         """Say where the confirmed tracks will be at a time, and how surely; the tracker stays as it is.
 
         Args:
@@ -230,7 +263,7 @@ class PaperTracker:
         return self._wanted_smoothers().smoothed(self.sensor_names)
 
     def drain_smoothed(self) -> Trajectories:
-        """Return the smoothed rows that are final and forget them, in order of time over all calls.
+        """Return the smoothed rows that are final and forget them.
 
         Raises:
             JeatGraphError: the configuration asks for no smoother.
@@ -249,12 +282,12 @@ class PaperTracker:
         return rows
 
     def sensor_states(self) -> dict[str, SensorState]:
-        """Return the mean factor on each sensor's noise, by name; the paper learns nothing else of sensors."""
+        """Return the mean factor on each sensor's noise, by name; the paper learns nothing else of them."""
         scale = self._tracks.scale[self._tracks.confirmed]
         mean = scale.mean(axis=0) if len(scale) else np.ones(len(self.sensor_names))
-        unknown = {"clutter": np.nan, "p_detect": np.nan, "trust": 1.0, "blind": 0.0}
+        unknown = float("nan")
         return {
-            name: SensorState(**unknown, noise_scale=float(mean[s]))
+            name: SensorState(unknown, unknown, 1.0, 0.0, float(mean[s]))
             for s, name in enumerate(self.sensor_names)
         }
 
