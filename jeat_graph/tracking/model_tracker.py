@@ -379,7 +379,7 @@ class ModelTracker(Updates, SavedModel):
         """Return what the living tracks are taken for, and why (`jeat-graph explain`)."""
         learnt, columns = self._model.learnt(), self._model.tracks()
         t = 0.0 if self.time is None else self.time
-        return hypotheses_of(columns, learnt, self.constants, t, self.causal().track_id)
+        return hypotheses_of(columns, learnt, self.constants, t, self.causal().track_id, self._looked)
 
     def sensor_states(self) -> dict[str, SensorState]:
         """Return what has been learnt of each sensor that has looked, by name; lags are not told."""
