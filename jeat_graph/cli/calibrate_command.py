@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from jeat_graph.runs.beside import Facts
 
 WRITES = ("out",)
-HELP = "Find sensors, clocks and what scores mean from recordings, with or without truth; write a configuration."
+HELP = (
+    "Find sensors, clocks and what scores mean from recordings, with or without truth; write a configuration."
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -224,9 +226,13 @@ def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
     names = ", ".join(f"{path.parent.name}/{path.name}" for path in files)
     lines = [f"Made by jeat-graph calibrate {__version__} from {len(args.detections)} recording(s):", names]
     if args.gt:
-        lines.append("rates, clocks and what scores mean (even_score): from detections matched with the truth.")
+        lines.append(
+            "rates, clocks and what scores mean (even_score): from detections matched with the truth."
+        )
     else:
-        lines.append("which sensors there are, their rates and their clocks: from the recordings, without truth.")
+        lines.append(
+            "which sensors there are, their rates and their clocks: from the recordings, without truth."
+        )
     lines += [f"image: from {picture}; all else from the base configuration {Path(args.config).name}."]
     return "\n".join(lines)
 

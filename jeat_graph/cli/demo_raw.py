@@ -54,4 +54,3 @@ def _run(arguments: Sequence[str]) -> int:
 
     say("demo", f"jeat-graph {' '.join(arguments)}")
     return main(arguments)
-

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jeat_graph.cli.detect_options import add_detecting, detect_request
+from jeat_graph.cli.live_options import CAMERAS, EVENT_CAMERAS, add_duration, until_interrupted
 from jeat_graph.cli.options import add_classes, add_rate
 from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import progress_to, refreshing
 
 if TYPE_CHECKING:
-    from jeat_graph.data.detections import Detections
+    from jeat_graph.data.detections import Detections, Scan
     from jeat_graph.detection.request import DetectRequest
 
 STDOUT = "-"
@@ -31,8 +34,17 @@ HELP = "find vehicles in raw pictures and events and write a file of detections"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     add = parser.add_argument
-    add("--frames", metavar="VIDEO|DIR|AEDAT4", help="a video, a folder of pictures, or an AEDAT4 file")
-    add("--events", metavar="FILE", help="a file of events, in any of the formats of `events info`")
+    add(
+        "--frames",
+        metavar="VIDEO|DIR|AEDAT4|CAMERA",
+        help=f"a video, a folder of pictures, an AEDAT4 file, or a camera that is on ({CAMERAS})",
+    )
+    add(
+        "--events",
+        metavar="FILE|CAMERA",
+        help=f"a file of events, in any of the formats of `events info`, or a camera ({EVENT_CAMERAS})",
+    )
+    add_duration(parser)
     add_detecting(parser)
     add_classes(parser, "look for these classes only: names or numbers of the network's; all: every one")
     add_rate(parser)
@@ -46,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Detect, and write the file."""
+    from jeat_graph.detection.live_detecting import is_live_request
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.outputs import check_keeps
@@ -56,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     if out.suffix.lower() not in (".csv", ".parquet"):
         raise DataError("must end in .csv or .parquet", out)
-    check_keeps(request.files, out)
+    if not is_live_request(request):
+        check_keeps(request.files, out)
     check_writable(out)
     found = detect_with_bar(request, "detect")
     write_detections(found, out)
@@ -74,8 +88,19 @@ def run(args: argparse.Namespace) -> int:
 def _to_stdout(request: DetectRequest) -> int:
     """Write each scan as soon as it is known."""
     from jeat_graph.detection.detecting import detect_scans
+    from jeat_graph.detection.live_detecting import detect_live, is_live_request
 
-    for scan in detect_scans(request, partial(say, "detect")):
+    tell = partial(say, "detect")
+    if is_live_request(request):
+        with until_interrupted() as until:
+            _write_lines(detect_live(request, tell, until=until))
+    else:
+        _write_lines(detect_scans(request, tell))
+    return 0
+
+
+def _write_lines(scans: Iterable[Scan]) -> None:
+    for scan in scans:
         boxes = np.round(scan.boxes, _PLACES).tolist()
         line: dict[str, Any] = {"t": round(scan.t, _TIME_PLACES), "sensor": scan.sensor, "boxes": boxes}
         line["scores"] = np.round(scan.scores, _PLACES + 1).tolist()
@@ -83,7 +108,6 @@ def _to_stdout(request: DetectRequest) -> int:
             line["classes"] = scan.classes.tolist()
         sys.stdout.write(json.dumps(line) + "\n")
         sys.stdout.flush()
-    return 0
 
 
 def detect_with_bar(request: DetectRequest, command: str) -> Detections:
@@ -91,9 +115,12 @@ def detect_with_bar(request: DetectRequest, command: str) -> Detections:
     from tqdm import tqdm
 
     from jeat_graph.detection.detecting import detect_files
+    from jeat_graph.detection.live_detecting import is_live_request
 
     tell = partial(say, command)
     hidden = not sys.stderr.isatty()
+    if is_live_request(request):
+        return _detect_with_clock(request, tell, hidden)
     if request.frames is not None:
         form = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
         with (
@@ -103,10 +130,27 @@ def detect_with_bar(request: DetectRequest, command: str) -> Detections:
         ):
             return detect_files(request, tell)
     # How long a file of events lasts is known at its end only.
+    with _time_shown(hidden) as on_time:
+        return detect_files(request, tell, on_time)
+
+
+@contextmanager
+def _time_shown(hidden: bool) -> Iterator[Callable[[float], None]]:
+    """Show on a terminal which time (s) has been reached."""
+    from tqdm import tqdm
+
     form = "{desc}: {n:.1f} s of the recording [{elapsed}]"
     with tqdm(desc="detect", bar_format=form, disable=hidden, leave=False) as bar, refreshing(bar):
 
         def on_time(t: float) -> None:
             bar.update(max(t - bar.n, 0.0))
 
-        return detect_files(request, tell, on_time)
+        yield on_time
+
+
+def _detect_with_clock(request: DetectRequest, tell: Callable[[str], object], hidden: bool) -> Detections:
+    """Detect in cameras that are on until Ctrl-C, or as long as is asked for."""
+    from jeat_graph.detection.live_detecting import detect_live, live_detections
+
+    with _time_shown(hidden) as on_time, until_interrupted() as until:
+        return live_detections(detect_live(request, tell, on_time, until), request)

@@ -46,6 +46,26 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         help="a network that looks at frames and events of the same pixels at once (`train fused`), "
         "instead of the other two; either may be missing",
     )
+    add_looking(parser)
+    add(
+        "--event-rate",
+        type=positive,
+        metavar="HZ",
+        help="scans of the events per second (default: 50; of networks beside frames, and of both, 20)",
+    )
+    add_event_layout(parser)
+    add(
+        "--event-delay",
+        type=finite,
+        default=0.0,
+        metavar="S",
+        help="what to add to the events' times for the clock of the frames (default: 0)",
+    )
+
+
+def add_looking(parser: argparse._ActionsContainer) -> None:
+    """Declare how detectors look."""
+    add = parser.add_argument
     add(
         "--detection-config",
         metavar="FILE",
@@ -67,20 +87,6 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         metavar="FILE.yaml|X1,Y1,X2,Y2,…",
         help="leave out boxes that lie mostly in a polygon (px): its corners, or a file with `masks: {name: "
         "[[x, y], …]}`; may be given many times; none: not even a burnt-in clock",
-    )
-    add(
-        "--event-rate",
-        type=positive,
-        metavar="HZ",
-        help="scans of the events per second (default: 50; of networks beside frames, and of both, 20)",
-    )
-    add_event_layout(parser)
-    add(
-        "--event-delay",
-        type=finite,
-        default=0.0,
-        metavar="S",
-        help="what to add to the events' times for the clock of the frames (default: 0)",
     )
 
 
@@ -186,6 +192,10 @@ def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
     return [(name, source) for name, (source, file, said) in given.items() if said and file is None]
 
 
+def _given(args: argparse.Namespace) -> list[str]:
+    return [source for source in (args.frames, args.events) if source is not None]
+
+
 def _looking_for(
     settings: DetectionSettings, classes: tuple[str, ...], args: argparse.Namespace
 ) -> DetectionSettings:
@@ -225,7 +235,10 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
     from jeat_graph.detection.masks import read_masks
     from jeat_graph.detection.request import DetectRequest
     from jeat_graph.detection.settings import load_settings
+    from jeat_graph.io.capture.addresses import is_live
 
+    if args.duration is not None and not any(map(is_live, _given(args))):
+        raise ConfigError("--duration is of cameras that are on; a recording is read to its end")
     for option, source in _without_input(args):
         raise ConfigError(f"{option} says nothing without {source}: give both, or leave it out")
     if _NO_MASK in args.masks and len(args.masks) > 1:
@@ -251,4 +264,5 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
         settings=settings,
         masks=read_masks([text for text in args.masks if text != _NO_MASK]),
         find_clock=_NO_MASK not in args.masks,
+        duration_s=args.duration,
     )

@@ -15,7 +15,7 @@ from jeat_graph.eval.tables import FORMATS
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.runs.explaining import TrackMoment, PlaceStory
+    from jeat_graph.runs.explaining import PlaceStory, TrackMoment
 
 WRITES = ("out",)
 HELP = "say why something in a run is a track, or is not: the terms of its log odds over time"
@@ -45,7 +45,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--at", type=_place, metavar="T,X,Y", help="what is, or is not, at a time (s) and a place (px)"
     )
     add("--out", metavar="FILE", help="also plot a track's terms there (.png, .svg, .pdf)")
-    add("--detections", nargs="+", metavar="FILE", help="the run's inputs, in their order, if they have moved")
+    add(
+        "--detections", nargs="+", metavar="FILE", help="the run's inputs, in their order, if they have moved"
+    )
     add("--format", choices=FORMATS, default="text", help="of tables (default: text)")
 
 
@@ -91,7 +93,11 @@ def _said_of_track(moments: Sequence[TrackMoment], track_id: int, form: str) -> 
 def _share_reported(moments: Sequence[TrackMoment], shown: Sequence[TrackMoment]) -> str:
     if not shown:
         return "never reported"
-    return "always reported" if len(shown) == len(moments) else f"reported at {len(shown)} of {len(moments)} steps"
+    return (
+        "always reported"
+        if len(shown) == len(moments)
+        else f"reported at {len(shown)} of {len(moments)} steps"
+    )
 
 
 def _table(moments: Sequence[TrackMoment]) -> Table:

@@ -32,6 +32,7 @@ COMMANDS = (
     "train",
     "track",
     "stream",
+    "serve",
     "batch",
     "eval",
     "compare",

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.detect_options import add_made_by, made_by
+from jeat_graph.cli.live_options import add_cameras, camera_settings, opened_cameras
 from jeat_graph.cli.options import (
     add_columns,
     add_config,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.data.errors import DataError
     from jeat_graph.data.trajectories import Trajectories
+    from jeat_graph.detection.live_detecting import LiveDetecting
     from jeat_graph.io.stream_reading import StreamReading
     from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.late import LiveTracker
@@ -59,6 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_image(parser)
     add_rig(parser)
     add_made_by(parser)
+    add_cameras(parser)
     add(
         "--format",
         choices=("json", "csv"),
@@ -113,13 +116,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track until the input ends, the reader of the output goes away, or a signal comes."""
+    _check_ends(args)
+    with contextlib.ExitStack() as cameras:
+        return _run(args, opened_cameras(args, cameras, _say))
+
+
+def _run(args: argparse.Namespace, cameras: LiveDetecting | None) -> int:
     from jeat_graph.cli.stream_output import StreamOutput
     from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.session import Ends, Session
     from jeat_graph.live.smoothed_file import SmoothedFile
     from jeat_graph.live.transport.patience import UnconfirmedError
 
-    config = _config(args)
+    config = _config(args, cameras)
     live, more = _tracker(args, config)
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
@@ -141,25 +150,25 @@ def run(args: argparse.Namespace) -> int:
         output.seq = more.get("count", 0)
         with contextlib.suppress(UnconfirmedError):  # after a signal; the session tells of it
             try:
-                _take_all(session, args, interrupts, source)
+                if cameras is not None:
+                    _take_from_cameras(cameras, session, interrupts, args.on_error)
+                else:
+                    _take_all(session, args, interrupts, source)
                 output.begin()  # an input without scans gives a table without rows
             finally:
                 # An error in a line, a signal or a reader that has gone: what is known is kept all the same.
-                _finish(session, args)
+                _finish(session, args, cameras)
     if interrupts.seen is not None:
         _say("interrupted")
         return 128 + interrupts.seen
     return 0
 
 
-def _config(args: argparse.Namespace) -> Config:
-    from dataclasses import replace
-
-    from jeat_graph.config.reading import load_config
+def _check_ends(args: argparse.Namespace) -> None:
+    """Refuse arguments that do not go together, before anything is opened."""
     from jeat_graph.data.errors import ConfigError
     from jeat_graph.live.transport.ends import check_addresses
 
-    config = load_config(args.config, [*made_by(args, _say), *overrides(args)], args.rig)
     if args.every is not None and args.checkpoint is None:
         raise ConfigError("--every is the time between checkpoints: it needs --checkpoint FILE")
     if args.sink is not None and args.format == "csv":
@@ -171,6 +180,16 @@ def _config(args: argparse.Namespace) -> Config:
         raise ConfigError("--road gives rows that stay: it needs --late skip or --late refuse")
     if args.road is not None and args.checkpoint is not None:
         raise ConfigError("--road does not go with --checkpoint, which does not hold its windows")
+
+
+def _config(args: argparse.Namespace, cameras: LiveDetecting | None) -> Config:
+    from dataclasses import replace
+
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.data.errors import ConfigError
+
+    declared = made_by(args, _say) if cameras is None else camera_settings(args, cameras, _say)
+    config = load_config(args.config, [*declared, *overrides(args)], args.rig)
     if args.smoothed is None:
         return replace(config, smoother=replace(config.smoother, engine="none"))
     if config.smoother.engine == "none":
@@ -276,6 +295,17 @@ def _take_from(
             since = 0
 
 
+def _take_from_cameras(
+    cameras: LiveDetecting, session: Session, interrupts: Interrupts, on_error: str
+) -> None:
+    """Take what is found in cameras until a signal comes, or the time is over."""
+    from jeat_graph.live.inputs import from_cameras
+
+    bad = _skip(session) if on_error == "skip" else None
+    for message, place in from_cameras(cameras, lambda: interrupts.seen is not None):
+        _take(session, message, place, bad)
+
+
 def _take(
     session: Session, message: ScanMessage, place: str, bad: Callable[[DataError], None] | None
 ) -> None:
@@ -306,7 +336,9 @@ def _skip(session: Session) -> Callable[[DataError], None]:
     return bad
 
 
-def _finish(session: Session, args: argparse.Namespace) -> None:
+def _finish(session: Session, args: argparse.Namespace, cameras: LiveDetecting | None) -> None:
+    from dataclasses import asdict
+
     from jeat_graph.io.atomic import open_atomic
 
     try:
@@ -314,7 +346,12 @@ def _finish(session: Session, args: argparse.Namespace) -> None:
     finally:  # a broker that takes no more is no reason to lose what is smoothed
         with contextlib.suppress(BrokenPipeError):
             session.finish()
+    record = session.summary()
+    if cameras is not None:
+        for line in cameras.dropped_lines():
+            _say(line)
+        record["cameras"] = [asdict(status) for status in cameras.statuses]
     if args.record is not None:
         with open_atomic(args.record) as file:
-            json.dump(session.summary(), file, indent=1)
+            json.dump(record, file, indent=1)
             file.write("\n")

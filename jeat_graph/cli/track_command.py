@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.detect_options import DEFAULT, add_detecting, detect_request, made_by
+from jeat_graph.cli.live_options import CAMERAS, EVENT_CAMERAS, add_duration, until_interrupted
 from jeat_graph.cli.options import (
     add_config,
     add_formats,
@@ -28,6 +29,7 @@ from jeat_graph.data.errors import DataError
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.detection.before_tracking import DetectedFile
+    from jeat_graph.detection.request import DetectRequest
 
 HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
 
@@ -63,9 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--frames",
-        metavar="VIDEO|DIR|AEDAT4",
+        metavar="VIDEO|DIR|AEDAT4|CAMERA",
         help="with DETECTIONS: the pictures that they were made from, which tell the picture's size and the "
-        "frame rate; without: the pictures to detect in",
+        f"frame rate; without: the pictures to detect in, or a camera that is on ({CAMERAS})",
     )
     add(
         "--camera",
@@ -79,14 +81,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "in the run directory holds what was found. With DETECTIONS, --detector-frames, --detector-events "
         "and --detector-fused say which networks made the boxes of the sensors rgb, evt and fused.",
     )
-    raw.add_argument("--events", metavar="FILE", help="events to detect in, in any format of `events info`")
+    raw.add_argument(
+        "--events",
+        metavar="FILE|CAMERA",
+        help=f"events to detect in, in any format of `events info`, or of a camera ({EVENT_CAMERAS})",
+    )
+    add_duration(raw)
     add_detecting(raw)
 
 
 def run(args: argparse.Namespace) -> int:
     """Read, check, track, and write the run directory."""
+    if args.detections and args.duration is not None:
+        raise DataError("--duration is of cameras that are on; DETECTIONS are read to their end")
     if args.detections and args.events is not None:
         raise DataError("--events is detected in where no DETECTIONS are given; give one or the other")
+    from jeat_graph.io.capture.addresses import is_live
     from jeat_graph.runs.run_options import RunOptions
     from jeat_graph.runs.track_files import TrackRequest, track_files
 
@@ -97,6 +107,8 @@ def run(args: argparse.Namespace) -> int:
     else:
         found = _detected(args)
         detections, declared, detectors = (found.path,), found.declared, found.detectors
+        if args.frames is not None and is_live(args.frames):
+            args.frames = None  # there is nothing more to be learnt of it
         args.classes = None  # the networks have looked for no others
     request = TrackRequest(
         detections=detections,
@@ -134,6 +146,7 @@ def _detected(args: argparse.Namespace) -> DetectedFile:
     """Detect in raw recordings; the file of detections lies in the run directory."""
     from jeat_graph.cli.detect_command import detect_with_bar
     from jeat_graph.detection.before_tracking import DETECTIONS, detect_before
+    from jeat_graph.detection.live_detecting import is_live_request
     from jeat_graph.io.atomic import check_writable
     from jeat_graph.io.outputs import check_folder
 
@@ -146,6 +159,8 @@ def _detected(args: argparse.Namespace) -> DetectedFile:
     check_folder(out)
     check_writable(out / DETECTIONS)
     request = replace(detect_request(args), one_picture=not _have_own_pictures(args))
+    if is_live_request(request):
+        return _detected_live(args, request, out)
     if args.image is not None and args.frames is not None:
         _check_image(args.image, args.frames)
     # Another configuration, a preset or the user's own, says itself what its sensors are.
@@ -157,6 +172,18 @@ def _detected(args: argparse.Namespace) -> DetectedFile:
         detect=lambda looked: detect_with_bar(looked, "track"),
     )
     args.image = args.image or (None if args.rig is not None else found.image)
+    return found
+
+
+def _detected_live(args: argparse.Namespace, request: DetectRequest, out: Path) -> DetectedFile:
+    """Detect in cameras that are on until Ctrl-C, or as long as is asked for."""
+    from jeat_graph.detection.before_tracking import detect_live_before
+
+    with until_interrupted() as until:
+        found = detect_live_before(request, out, declare=args.config == DEFAULT, say=_say, until=until)
+    if args.image is not None and args.image != found.image:
+        raise DataError(f"--image says {args.image}, but the pictures have {found.image}")
+    args.image = None if args.rig is not None else found.image
     return found
 
 

@@ -16,6 +16,7 @@ PACKAGES: dict[str, tuple[str, ...]] = {
         "requests>=2.28",
         "pydeprecate>=0.9,<0.14",
     ),
+    "dv": ("dv-processing>=2,<3",),
     "hdf5": ("hdf5plugin>=5",),
     "kafka": ("confluent-kafka>=2.6,<3",),
     "mqtt": ("paho-mqtt>=2.1,<3",),
@@ -25,6 +26,7 @@ PACKAGES: dict[str, tuple[str, ...]] = {
     "ray": ("ray>=2.40,<3",),
     "rerun": ("rerun-sdk>=0.28,<1",),
     "ros": ("rosbags>=0.11,<0.12",),
+    "serve": ("prometheus-client>=0.21,<1",),
 }
 
 

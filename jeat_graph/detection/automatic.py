@@ -33,7 +33,7 @@ from jeat_graph.io.video import FrameSource, RgbImage, open_frames
 HIGHWAYS = "sehn"
 #: How much of a recording is looked at (s), pictures for what moves there, and those that networks look at.
 LOOK_S = 3.0
-_PICTURES, _LOOKS = 25, 6
+PICTURES, _LOOKS = 25, 6
 #: A box is sound if this share of it moves, or from this score on.
 _MOVING, _SURE = 0.3, 0.5
 #: A network is trusted if this share of its boxes is sound, it has so many a picture, and sees this share of
@@ -90,24 +90,43 @@ def resolved(request: DetectRequest, say: Callable[[str], object] = lambda _: No
     with ExitStack() as stack:
         stack.enter_context(one_thread())
         source = stack.enter_context(open_frames(request.frames, request.rate_hz))
-        frames, times_s = _first(source)
-        moving = _moving(frames, times_s, request.settings.frames)
-        looks = np.unique(np.linspace(0, len(frames) - 1, min(_LOOKS, len(frames))).round().astype(int))
-        pictures = [(frames[k], moving[k]) for k in looks.tolist()]
-        found = []
-        for name, look, accuracy in _candidates(request.settings, say):
-            try:
-                found.append(_impression(name, look, accuracy, pictures))
-            except DataError as error:  # a network that does not work here is none
-                say(str(error))
+        return replace(request, detector_frames=chosen_by(*_first(source), request.settings, say))
+
+
+def chosen_by(
+    frames: Sequence[RgbImage],
+    times_s: FloatArray,
+    settings: DetectionSettings,
+    say: Callable[[str], object] = lambda _: None,
+) -> str:
+    """Return the name of the detector to take, by pictures of some seconds, and say how it was chosen.
+
+    Args:
+        frames: pictures (H, W, 3).
+        times_s: (F,) their times (s), ascending.
+        settings: of the detectors.
+        say: called with a line that says what was chosen, and why.
+
+    Raises:
+        ConfigError: classes are asked for that nothing here knows.
+    """
+    moving = _moving(frames, times_s, settings.frames)
+    looks = np.unique(np.linspace(0, len(frames) - 1, min(_LOOKS, len(frames))).round().astype(int))
+    pictures = [(frames[k], moving[k]) for k in looks.tolist()]
+    found = []
+    for name, look, accuracy in _candidates(settings, say):
+        try:
+            found.append(_impression(name, look, accuracy, pictures))
+        except DataError as error:  # a network that does not work here is none
+            say(str(error))
     chosen = choose_among(found, any(len(boxes) for boxes in moving))
-    if chosen == MOTION and request.settings.model_frames.classes:
+    if chosen == MOTION and settings.model_frames.classes:
         raise ConfigError(
             "--class: no detector here that can be trusted knows classes; --detector-frames NAME"
         )
     tried = "; ".join(str(one) for one in found) or "no network of road users is on this machine"
     say(f"detector: {chosen}, by the first {LOOK_S:g} s ({tried}); --detector-frames NAME takes another")
-    return replace(request, detector_frames=chosen)
+    return chosen
 
 
 def choose_among(found: Sequence[Impression], anything_moves: bool) -> str:
@@ -132,7 +151,7 @@ def choose_among(found: Sequence[Impression], anything_moves: bool) -> str:
 def _first(source: FrameSource) -> tuple[list[RgbImage], FloatArray]:
     """Return pictures of the first seconds and their times (s)."""
     count = int(np.searchsorted(source.times_s, source.times_s[0] + LOOK_S, side="right"))
-    chosen = np.unique(np.linspace(0, count - 1, min(_PICTURES, count)).round().astype(int))
+    chosen = np.unique(np.linspace(0, count - 1, min(PICTURES, count)).round().astype(int))
     return [source.frame(int(k)) for k in chosen], source.times_s[chosen]
 
 

@@ -10,6 +10,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.detection.automatic import resolved
 from jeat_graph.detection.declared import declared_settings
 from jeat_graph.detection.detecting import detect_files, picture_of
+from jeat_graph.detection.live_detecting import detect_live, live_detections
 from jeat_graph.detection.request import DetectRequest
 
 #: Within the run directory, where raw recordings were tracked.
@@ -63,3 +64,28 @@ def detect_before(
     with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
         write_detections(detect_files(request, say) if detect is None else detect(request), found)
     return DetectedFile(str(found), tuple(declared), image, request.detectors)
+
+
+def detect_live_before(
+    request: DetectRequest,
+    out: Path,
+    *,
+    declare: bool,
+    say: Callable[[str], object] = lambda _: None,
+    until: Callable[[], bool] = lambda: False,
+) -> DetectedFile:
+    """Do the same with cameras that are on, until an end is asked for.
+
+    Args and errors as of `detect_before`; `until` tells when to end.
+    """
+    from jeat_graph.io.detections_io import write_detections
+    from jeat_graph.io.locking import hold_made_folder
+
+    found = out / DETECTIONS
+    known: list[tuple[DetectRequest, tuple[int, int]]] = []
+    with hold_made_folder(out):
+        scans = detect_live(request, say, until=until, prepared=lambda *what: known.append(what))
+        write_detections(live_detections(scans, request), found)
+    [(looked, size_px)] = known
+    declared = declared_settings(looked, say) if declare else []
+    return DetectedFile(str(found), tuple(declared), size_px, looked.detectors)

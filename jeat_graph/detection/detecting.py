@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 FRAMES_SENSOR, EVENTS_SENSOR, FUSED_SENSOR = "rgb", "evt", "fused"
 _US_PER_S = 1e6
 #: A burnt-in clock is looked for in so much of a recording (s).
-_CLOCK_S = 3.2
+CLOCK_S = 3.2
 #: Pieces of a file of events that are read ahead.
 _PIECES_AHEAD = 2
 _Scans = Generator[Scan, None, None]
@@ -186,7 +186,7 @@ def _quiet_parts(
 
     masks = request.masks
     if request.find_clock:
-        count = int(np.searchsorted(source.times_s, source.times_s[0] + _CLOCK_S, side="right"))
+        count = int(np.searchsorted(source.times_s, source.times_s[0] + CLOCK_S, side="right"))
         greys = [
             np.asarray(cv2.cvtColor(source.frame(k), cv2.COLOR_RGB2GRAY), dtype=np.uint8)
             for k in range(count)
@@ -278,19 +278,26 @@ def _events(
 
 def _event_scans(request: DetectRequest, recording: _Recording, say: Callable[[str], object]) -> _Scans:
     reader, size_px = recording
-    settings = request.settings
-    if request.detector_events != MOTION:
-        from jeat_graph.detection.models.events import ModelEventDetector
+    detector, note = event_detector(request, size_px, say)
+    return _with_note(_pushed(detector, reader, request, say), note, say)
 
-        network = network_file(request.detector_events, EVENTS)
-        times = settings.events
-        if request.frames is not None:
-            times = replace(times, rate_hz=times.rate(BESIDE_RATE_HZ))
-        model = ModelEventDetector(network, size_px, EVENTS_SENSOR, times, settings.model_events)
-        say(model.description)
-        return _with_note(_pushed(model, reader, request, say), model.note, say)
-    detector = EventDetector(size_px, EVENTS_SENSOR, settings.events)
-    return _pushed(detector, reader, request, say)
+
+def event_detector(
+    request: DetectRequest, size_px: tuple[int, int], say: Callable[[str], object]
+) -> tuple[BinnedDetector, Callable[[], str]]:
+    """Return what looks at events of a width and height (px), and what tells of it at the end."""
+    settings = request.settings
+    if request.detector_events == MOTION:
+        return EventDetector(size_px, EVENTS_SENSOR, settings.events), str
+    from jeat_graph.detection.models.events import ModelEventDetector
+
+    network = network_file(request.detector_events, EVENTS)
+    times = settings.events
+    if request.frames is not None:
+        times = replace(times, rate_hz=times.rate(BESIDE_RATE_HZ))
+    model = ModelEventDetector(network, size_px, EVENTS_SENSOR, times, settings.model_events)
+    say(model.description)
+    return model, model.note
 
 
 def _pushed(

@@ -20,8 +20,8 @@ class DetectRequest:
     """What shall be looked for, and where.
 
     Attributes:
-        frames: a video, a folder of pictures, or an AEDAT 4 file; or None.
-        events: a file of events; or None.
+        frames: a video, a folder of pictures, an AEDAT 4 file, or a camera that is on now; or None.
+        events: a file of events, or an event camera that is on now; or None.
         detector_frames: `motion`, a network with a name, an ONNX file, or `auto` (`automatic.resolved`).
         detector_events: the same.
         detector_fused: a network that looks at both at once, instead of the other two; or None.
@@ -32,6 +32,7 @@ class DetectRequest:
         one_picture: whether pictures and events must be of the same pixels, as who tracks them needs.
         settings: of the detectors.
         masks: where no vehicles are looked for, in pixels of the frames, or of the events without frames.
+        duration_s: how long a camera that is on now is looked at (s); None: until somebody ends it.
         find_clock: whether a clock that is burnt into the frames is masked, too, for what finds what moves.
     """
 
@@ -48,6 +49,7 @@ class DetectRequest:
     settings: DetectionSettings = field(default_factory=DetectionSettings)
     masks: Masks = field(default_factory=Masks)
     find_clock: bool = True
+    duration_s: float | None = None
 
     def __post_init__(self) -> None:
         if self.frames is None and self.events is None:

@@ -22,6 +22,8 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.rates import median_rate_hz
+from jeat_graph.data.secrets import shown_url
+from jeat_graph.io.capture.addresses import is_live
 from jeat_graph.io.decoders import Decoder, PictureDecoder, RgbImage, VideoDecoder, quietly
 from jeat_graph.io.frame_times import (
     FRAME_TIMES,
@@ -129,6 +131,7 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
     Raises:
         DataError: nothing there, nothing to be read, no rate known, or a list of times that does not fit.
     """
+    _check_is_recorded(path)
     place = Path(path)
     if place.is_dir():
         inner = next((place / name for name in VIDEO_FILES.values() if (place / name).exists()), None)
@@ -157,6 +160,7 @@ def peek(path: str | Path) -> tuple[tuple[int, int], float | None]:
     Raises:
         DataError: nothing there, or nothing that can be read.
     """
+    _check_is_recorded(path)
     place = Path(path)
     if place.is_dir():
         inner = next((place / name for name in VIDEO_FILES.values() if (place / name).exists()), None)
@@ -174,6 +178,14 @@ def peek(path: str | Path) -> tuple[tuple[int, int], float | None]:
         return (width, height), median_rate_hz(times)
     finally:
         decode.close()
+
+
+def _check_is_recorded(path: str | Path) -> None:
+    """Refuse a camera that is on now."""
+    if is_live(path):
+        raise DataError(
+            "is a camera that is on: `detect`, `track` and `stream` take it", shown_url(str(path))
+        )
 
 
 class _NoTimesError(DataError):

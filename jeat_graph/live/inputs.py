@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.detection.live_detecting import LiveDetecting
+from jeat_graph.io.scan_batch import ScanBatch
 from jeat_graph.io.scan_lines import read_batches
 from jeat_graph.io.stream_reading import StreamReading
 from jeat_graph.live.interrupts import Interrupts
@@ -66,3 +68,15 @@ def from_source(
             yield None
             continue
         yield None if message is None else (message, f"{name}:{number}: ")
+
+
+def from_cameras(cameras: LiveDetecting, until: Callable[[], bool]) -> Iterator[tuple[ScanMessage, str]]:
+    """Yield what is found in cameras that are on, and where; `cameras.request.duration_s` ends it, too.
+
+    Args:
+        cameras: prepared.
+        until: tells when to end.
+    """
+    name = " + ".join(status.name for status in cameras.statuses)
+    for number, scan in enumerate(cameras.scans(until), 1):
+        yield ScanMessage(ScanBatch([scan], [number]), "", None), f"{name}:{number}: "

@@ -29,8 +29,8 @@ from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.first_sight import ToldSoFar
-from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.model_tracker import PendingStep
+from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.tracker import Tracker
 
 REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"

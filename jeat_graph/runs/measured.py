@@ -16,7 +16,6 @@ from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.io.beside import check_beside
 from jeat_graph.io.hashing import sha256_of
-from jeat_graph.io.scans_io import read_instants
 from jeat_graph.rig.common_picture import by_recorded_ways
 from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON, read_record
 from jeat_graph.runs.inputs import find_input

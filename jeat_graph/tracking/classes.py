@@ -169,4 +169,3 @@ def number_classes(known: dict[str, int], batch: Sequence[Scan]) -> dict[str, in
     out = numbered(sorted(fresh), known)
     del out[""]
     return out
-

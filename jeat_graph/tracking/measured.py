@@ -51,4 +51,3 @@ class ConfirmedMeasurements:
         self._waiting = [rows[~chosen & np.isin(rows["track_id"], self._living)]]
         self._confirmed = [np.intersect1d(confirmed, self._living)]
         return np.asarray(rows[chosen])
-

@@ -220,7 +220,7 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     present = tracks.presence[:, VISIBLE] * p_detect
     ratio = likelihood_ratio.pair_log_ratio(density, present, score, clutter)
     track, box = likelihood_ratio.assign(by_looks(ratio, scan.alike))
-    seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track]
+    seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track, box]
     nis = (seen[0].mean(axis=2) ** 2 / seen[1].mean(axis=(2, 3))).sum(axis=1)
     return AssociatedPairs(track, box, ratio[track, box], p_detect, innovation, nis)
 

@@ -33,4 +33,3 @@ class SensorState(NamedTuple):
     offset_place_y: tuple[float, float] = (0.0, 0.0)
     lag_s: float = 0.0
     lag_std_s: float | None = None
-

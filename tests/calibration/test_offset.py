@@ -66,7 +66,9 @@ def test_lags_add_to_what_is_known_and_one_that_was_not_found_counts_for_nothing
 
 
 def test_beside_the_truth_a_sensor_may_be_early():
-    assert latencies(with_lags(load_config("default", TWO), EARLY)) == pytest.approx({"rgb": -0.02, "evt": 0.01})
+    assert latencies(with_lags(load_config("default", TWO), EARLY)) == pytest.approx(
+        {"rgb": -0.02, "evt": 0.01}
+    )
 
 
 def test_where_nothing_else_is_known_the_earliest_sensor_is_on_time():

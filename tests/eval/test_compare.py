@@ -82,9 +82,7 @@ def many(count=30, seed=4, claimed=NOISE):
         one, t, x = track(rng, claimed=claimed, identity=identity)
         moved = np.zeros((2, 3))
         moved[0, 0] = 4000.0 * identity
-        tracks.append(
-            replace(one, mean=one.mean + moved, predicted_mean=one.predicted_mean + moved)
-        )
+        tracks.append(replace(one, mean=one.mean + moved, predicted_mean=one.predicted_mean + moved))
         motion = (x + moved).transpose(0, 2, 1).reshape(-1, 6)
         truths.append((t, np.full(len(t), identity), motion[:, :2], motion))
     t, ids, centre, motion = (np.concatenate(column) for column in zip(*truths, strict=True))

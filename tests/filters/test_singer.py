@@ -45,8 +45,8 @@ def test_process_noise_is_the_integral_of_what_is_driven(dt, noise):
 def test_long_times_give_the_papers_constant_acceleration(dt):
     long = replace(C, velocity_time_s=1e7, acceleration_time_s=1e7)
     model = singer.discretise(dt, long)
-    np.testing.assert_allclose(model.F[:3, :3], motion.transition.py_func(dt), rtol=1e-5, atol=1e-6)
-    want = motion.process_noise.py_func(dt, 1.0)
+    np.testing.assert_allclose(model.F[:3, :3], motion.transition(dt), rtol=1e-5, atol=1e-6)
+    want = motion.process_noise(dt, 1.0)
     np.testing.assert_allclose(model.jerk[:3, :3], want, rtol=1e-5)
 
 

@@ -63,6 +63,11 @@ class Server:
         self._process.terminate()
         self._process.wait()
 
+    def kill(self) -> None:
+        """End it as a crash would."""
+        self._process.kill()
+        self._process.wait()
+
     def freeze(self) -> None:
         """Have it keep its connections and say nothing more, as behind a network that is gone."""
         self._process.send_signal(signal.SIGSTOP)

@@ -11,7 +11,7 @@ import pytest
 from jeat_graph.smoothers.gtsam.filter_graph import filter_graph
 
 sys.path.append(str(Path(__file__).parent))
-from test_filtered_track import filtered  # noqa: E402
+from test_filtered_track import filtered
 
 
 def at_one_time(track):

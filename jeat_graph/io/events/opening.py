@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.capture.addresses import is_live
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.reader import EventReader
 
@@ -67,6 +68,8 @@ def open_events(
 
 
 def _opened(place: Path, size_px: tuple[int, int] | None, layout: EventLayout) -> EventReader:
+    if is_live(place):
+        raise DataError("is a camera that is on: `detect`, `track` and `stream` take it", place)
     if place.is_dir() and (place / "metadata.yaml").is_file():
         from jeat_graph.io.events.rosbag import RosbagReader
 

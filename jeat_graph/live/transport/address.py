@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import ipaddress
-import os
 import re
 from collections.abc import Collection
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NoReturn, TypeVar
 from urllib.parse import SplitResult, parse_qsl, unquote, urlsplit
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.secrets import Secret, shown_url
+from jeat_graph.io.credentials import PASSWORD_FILE, login_text, password_from
+from jeat_graph.live.transport import tls
+from jeat_graph.live.transport.tls import Tls
 from jeat_graph.live.transport.topics import wrong_name, wrong_topic
 
 PORTS = {"mqtt": 1883, "nats": 4222, "kafka": 9092}
-#: The option that every address has: a file with the password in its only line.
-PASSWORD_FILE = "password_file"
-#: More is no password (bytes).
-_PASSWORD_MOST = 4096
+#: Encrypted, `SCHEME+tls` (and `mqtts`, as others write it), at these ports.
+SECURE_PORTS = {"mqtt": 8883, "nats": 4222, "kafka": 9093}
+_SECURE = {**{f"{scheme}+tls": scheme for scheme in SECURE_PORTS}, "mqtts": "mqtt"}
 #: Bound of how many messages may be open: what MQTT can say.
 NUMBER_MOST = 65_535
-_VARIABLE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}")
 #: Part of a machine's name between two dots.
 _LABEL = re.compile(r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)")
 _HOST_MOST = 253
@@ -44,6 +43,7 @@ class Address:
         user: name to log in with, or None; a token of NATS stands here.
         password: password, or None.
         options: what stands behind the question mark.
+        tls: how the connection is encrypted, or None.
     """
 
     scheme: str
@@ -53,6 +53,7 @@ class Address:
     user: Secret | None
     password: Secret | None
     options: dict[str, str]
+    tls: Tls | None = None
 
     @property
     def server(self) -> str:
@@ -60,7 +61,7 @@ class Address:
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
     def __str__(self) -> str:
-        return f"{self.scheme}://{self.server}/{self.topic}"
+        return f"{self.scheme}{'' if self.tls is None else '+tls'}://{self.server}/{self.topic}"
 
     def __repr__(self) -> str:
         return f"Address({str(self)!r})"
@@ -94,29 +95,42 @@ def parse_address(url: str, known: Collection[str]) -> Address:
     option `password_file` names a file that holds the password.
 
     Args:
-        url: `SCHEME://[USER[:PASSWORD]@]HOST[:PORT]/TOPIC[?OPTION=VALUE&…]`. MQTT's `#` may stand as it is.
-        known: names of the options that make sense, beside `password_file`.
+        url: `SCHEME://[USER[:PASSWORD]@]HOST[:PORT]/TOPIC[?OPTION=VALUE&…]`, encrypted where the scheme ends
+            in `+tls`. MQTT's `#` may stand as it is.
+        known: names of the options that make sense, beside `password_file` and those of `tls`.
 
     Raises:
         ConfigError: what is wrong, and what would be right; never with what may be a password.
     """
     parts = _split(url)
-    host, port = _host(parts, url), _port(parts, url)
+    secure = parts.scheme in _SECURE
+    parts = parts._replace(scheme=scheme_of(url))
+    host, port = _host(parts, url), _port(parts, url, secure)
     topic = unquote(parts.path.removeprefix("/"))
     if not topic:
         _refuse(url, f"names no topic; {_EXAMPLE}")
     wrong = wrong_topic(parts.scheme, topic)
     if wrong:
         _refuse(url, f"the topic is not valid: {wrong}")
-    options = _options(parts, url, known)
+    options = _options(parts, url, (*known, *(tls.OPTIONS if secure else ())))
+    try:
+        encrypted = Tls.of(options) if secure else None
+    except ConfigError as error:
+        _refuse(url, str(error))
     user = _login(parts.username, url)
     password = _login(parts.password, url)
     file = options.pop(PASSWORD_FILE, None)
     if file is not None:
         if user is None or password is not None:
             _refuse(url, f"{PASSWORD_FILE} goes with a user and without a password: user@host")
-        password = _password_from(file)
-    return Address(parts.scheme, host, port, topic, user, password, options)
+        password = password_from(file)
+    return Address(parts.scheme, host, port, topic, user, password, options, encrypted)
+
+
+def scheme_of(url: str) -> str:
+    """Return `mqtt`, `nats` or `kafka`, encrypted or not; else what stands there."""
+    scheme = url.partition(":")[0].lower()
+    return _SECURE.get(scheme, scheme)
 
 
 def _refuse(url: str, why: str) -> NoReturn:
@@ -136,7 +150,7 @@ def _split(url: str) -> SplitResult:
         parts = urlsplit(url.replace("#", "%23"))
     except ValueError:
         _refuse(url, f"the host is no name and no number; {_EXAMPLE}")
-    if parts.scheme not in PORTS:
+    if parts.scheme not in (*PORTS, *_SECURE):
         raise ConfigError(f"{_shown(url)!r} is no address of a broker; {_EXAMPLE}")
     if "@" in parts.path or "@" in parts.query:
         # Most likely the rest of a password; to go on would show it as a topic.
@@ -160,13 +174,13 @@ def _host(parts: SplitResult, url: str) -> str:
     return host
 
 
-def _port(parts: SplitResult, url: str) -> int:
+def _port(parts: SplitResult, url: str, secure: bool) -> int:
     try:
         port = parts.port
     except ValueError:
         port = 0
     if port is None:
-        return PORTS[parts.scheme]
+        return (SECURE_PORTS if secure else PORTS)[parts.scheme]
     if port == 0:
         _refuse(url, f"the port is no number from 1 to 65535; {_EXAMPLE}")
     return port
@@ -176,47 +190,21 @@ def _options(parts: SplitResult, url: str, known: Collection[str]) -> dict[str, 
     """Return the options; each is known, given once and not empty."""
     options: dict[str, str] = {}
     for name, value in parse_qsl(parts.query, keep_blank_values=True):
+        if name in tls.OPTIONS and name not in known:
+            _refuse(url, f"{name} is of an encrypted connection: write {parts.scheme}+tls://")
         if name not in (*known, PASSWORD_FILE):
             names = ", ".join((*known, PASSWORD_FILE))
             raise ConfigError(f"unknown option {name!r} in the address; known: {names}")
         if name in options:
             _refuse(url, f"the option {name} is given twice")
-        if not value or (name != PASSWORD_FILE and wrong_name(parts.scheme, value)):
+        if not value or (name not in (PASSWORD_FILE, *tls.OPTIONS) and wrong_name(parts.scheme, value)):
             _refuse(url, f"the option {name} has no value that the broker takes")
         options[name] = value
     return options
 
 
 def _login(text: str | None, url: str) -> Secret | None:
-    """Return a user or a password as it is meant: `%` and two digits as a sign, `${NAME}` as a variable."""
-    if not text:
-        return None
-    found = []
-    for k, part in enumerate(_VARIABLE.split(text)):
-        if k % 2:  # the names of variables stand between what is around them
-            value = os.environ.get(part, "")
-            if not value:
-                _refuse(url, f"the environment variable {part} is not set")
-            found.append(value)
-        elif "${" in part:
-            _refuse(url, "a variable is written ${NAME}")
-        else:
-            found.append(unquote(part))
-    return Secret("".join(found))
-
-
-def _password_from(file: str) -> Secret:
-    """Read the only line of a file; its content is in no message."""
     try:
-        with Path(file).open("rb") as stream:
-            content = stream.read(_PASSWORD_MOST + 1)
-    except (OSError, ValueError) as error:
-        why = error.strerror if isinstance(error, OSError) else "is no file"
-        raise ConfigError(f"{PASSWORD_FILE}: {file}: {why}") from None
-    try:
-        text = content.decode().removesuffix("\n").removesuffix("\r")
-    except UnicodeDecodeError:
-        text = ""
-    if not text or len(content) > _PASSWORD_MOST or not text.isprintable():
-        raise ConfigError(f"{PASSWORD_FILE}: {file}: must hold one line, the password, in UTF-8")
-    return Secret(text)
+        return login_text(text)
+    except ConfigError as error:
+        _refuse(url, str(error))

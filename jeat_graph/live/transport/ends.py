@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import ipaddress
 from typing import Protocol
 
 from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.data.extras import install
-from jeat_graph.live.transport.address import Address, parse_address
+from jeat_graph.live.transport.address import Address, parse_address, scheme_of
 from jeat_graph.live.transport.notices import Notices, Tell, say_nothing
 from jeat_graph.live.transport.patience import Overdue, never
 from jeat_graph.live.transport.topics import covers, has_wild_cards
@@ -85,7 +86,7 @@ def source_address(url: str) -> Address:
     Raises:
         ConfigError: it is not valid.
     """
-    return parse_address(url, SOURCE_OPTIONS.get(_scheme(url), ()))
+    return parse_address(url, SOURCE_OPTIONS.get(scheme_of(url), ()))
 
 
 def sink_address(url: str) -> Address:
@@ -94,7 +95,7 @@ def sink_address(url: str) -> Address:
     Raises:
         ConfigError: it is not valid.
     """
-    address = parse_address(url, SINK_OPTIONS.get(_scheme(url), ()))
+    address = parse_address(url, SINK_OPTIONS.get(scheme_of(url), ()))
     if has_wild_cards(address.scheme, address.topic):
         raise ConfigError(f"{address}: tracks go to one topic, without wild cards")
     return address
@@ -122,20 +123,24 @@ def check_addresses(source: str | None, sink: str | None) -> None:
         raise ConfigError(f"{one}: source and sink are both called client={client}; names must differ")
 
 
-def open_source(url: str, overdue: Overdue = never, tell: Tell = say_nothing) -> Source:
+def open_source(
+    url: str, overdue: Overdue = never, tell: Tell = say_nothing, notices: Notices | None = None
+) -> Source:
     """Open the source at an address.
 
     Args:
         url: the address.
         overdue: tells when the program is to end; then nothing is waited for any longer.
         tell: takes each line for the user; called by whoever calls the source.
+        notices: takes them instead of `tell`, and knows whether there is a connection.
 
     Raises:
         ConfigError: the address is not valid.
         JeatGraphError: the client's package is missing, or nobody answers at the address.
     """
     address = source_address(url)
-    notices = Notices(tell)
+    notices = notices or Notices(tell)
+    _warn_of(address, notices)
     try:
         if address.scheme == "mqtt":
             from jeat_graph.live.transport.mqtt import MqttSource
@@ -152,20 +157,24 @@ def open_source(url: str, overdue: Overdue = never, tell: Tell = say_nothing) ->
         raise _missing(address.scheme, error) from None
 
 
-def open_sink(url: str, overdue: Overdue = never, tell: Tell = say_nothing) -> Sink:
+def open_sink(
+    url: str, overdue: Overdue = never, tell: Tell = say_nothing, notices: Notices | None = None
+) -> Sink:
     """Open the sink at an address.
 
     Args:
         url: the address.
         overdue: tells when the program is to end; then nothing is waited for any longer.
         tell: takes each line for the user; called by whoever calls the sink.
+        notices: takes them instead of `tell`, and knows whether there is a connection.
 
     Raises:
         ConfigError: the address is not valid.
         JeatGraphError: the client's package is missing, or nobody answers at the address.
     """
     address = sink_address(url)
-    notices = Notices(tell)
+    notices = notices or Notices(tell)
+    _warn_of(address, notices)
     try:
         if address.scheme == "mqtt":
             from jeat_graph.live.transport.mqtt import MqttSink
@@ -182,8 +191,27 @@ def open_sink(url: str, overdue: Overdue = never, tell: Tell = say_nothing) -> S
         raise _missing(address.scheme, error) from None
 
 
-def _scheme(url: str) -> str:
-    return url.partition(":")[0].lower()
+def _warn_of(address: Address, notices: Notices) -> None:
+    """Say loudly what others on the way could do."""
+    if address.tls is not None and address.tls.insecure:
+        notices.add(
+            f"warning: {address}: INSECURE: the broker's certificate is not looked at, and whoever is on the "
+            "way can read and change everything; give ca=FILE instead of insecure=yes"
+        )
+    if address.tls is None and address.password is not None and not _is_here(address.host):
+        notices.add(
+            f"warning: {address}: the password goes over the network unencrypted; {address.scheme}+tls:// "
+            "encrypts"
+        )
+
+
+def _is_here(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _missing(scheme: str, error: ImportError) -> JeatGraphError:

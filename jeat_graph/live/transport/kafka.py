@@ -16,6 +16,8 @@ from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedErro
 #: Kafka itself sets no bound to what is received and not committed; the stream commits at least so often.
 MOST_OPEN = 4096
 _CONNECT_S = 10.0
+#: Pauses between looks for a broker that does not answer, and longest wait for one (s).
+_LOOK_S, _ASK_S = 5.0, 0.5
 #: Errors that do not pass by themselves.
 _FOR_GOOD = (KafkaError.TOPIC_AUTHORIZATION_FAILED, KafkaError.GROUP_AUTHORIZATION_FAILED)
 #: How soon the group takes a member for dead that does not answer (ms): a restart should not wait longer.
@@ -26,15 +28,23 @@ _REFRESH_MS = 2000
 _MESSAGE_MOST = 128 * 2**20
 
 
-def _settings(address: Address) -> dict[str, Any]:
+def _settings(address: Address, notices: Notices) -> dict[str, Any]:
+    def on_error(error: KafkaError) -> None:
+        # It mends connections by itself; what is for good stands in the messages.
+        if error.code() == KafkaError._ALL_BROKERS_DOWN:
+            notices.lost(address, "no broker answers")
+
     settings: dict[str, Any] = {
         "bootstrap.servers": address.server,
         "log_level": 0,
-        "error_cb": lambda _: None,  # it mends connections by itself; what is for good stands in the messages
+        "error_cb": on_error,
+        "security.protocol": "plaintext" if address.tls is None else "ssl",
     }
+    if address.tls is not None:
+        settings |= address.tls.librdkafka()
     if address.user is not None:
         settings |= {
-            "security.protocol": "sasl_plaintext",
+            "security.protocol": "sasl_plaintext" if address.tls is None else "sasl_ssl",
             "sasl.mechanism": "PLAIN",
             "sasl.username": address.user.reveal(),
             "sasl.password": "" if address.password is None else address.password.reveal(),
@@ -42,11 +52,12 @@ def _settings(address: Address) -> dict[str, Any]:
     return settings
 
 
-def _reach(client: Any, address: Address) -> None:
+def _reach(client: Any, address: Address, notices: Notices) -> None:
     try:
         client.list_topics(timeout=_CONNECT_S)
     except KafkaException as error:
         raise JeatGraphError(f"{address}: {error.args[0].str()}") from None
+    notices.found(address)
 
 
 class KafkaSource:
@@ -67,10 +78,11 @@ class KafkaSource:
         self.most_open = MOST_OPEN
         self.address = address
         self._notices = notices or Notices()
+        self._look_at = 0.0
         self._next: dict[tuple[str, int], int] = {}
         self._group = address.option("group", f"jeat-graph.{address.topic}")
         self._consumer = Consumer(
-            _settings(address)
+            _settings(address, self._notices)
             | {
                 "group.id": self._group,
                 "enable.auto.commit": False,
@@ -80,7 +92,7 @@ class KafkaSource:
                 "topic.metadata.refresh.interval.ms": _REFRESH_MS,
             }
         )
-        _reach(self._consumer, address)
+        _reach(self._consumer, address, self._notices)
         self._consumer.subscribe(
             [address.topic], on_assign=self._on_assign, on_revoke=self._on_revoke, on_lost=self._on_revoke
         )
@@ -116,14 +128,26 @@ class KafkaSource:
             message: Any = self._consumer.poll(max(end - time.monotonic(), 0.0))
             self._notices.tell()
             if message is None:
+                self._look_for_broker()
                 return None
             error = message.error()
             if error is None:
                 break
             if error.fatal() or error.code() in _FOR_GOOD:
                 raise JeatGraphError(f"{self.address}: {error.str()}")
+        self._notices.found(self.address)
         self._next[message.topic(), message.partition()] = message.offset() + 1
         return bytes(message.value() or b"")
+
+    def _look_for_broker(self) -> None:
+        """See whether a broker that did not answer is back, which a topic without messages does not show."""
+        now = time.monotonic()
+        if self._notices.connected or now < self._look_at:
+            return
+        self._look_at = now + _LOOK_S
+        with contextlib.suppress(KafkaException):
+            self._consumer.list_topics(self.address.topic, timeout=_ASK_S)
+            self._notices.found(self.address)
 
     def commit(self) -> None:
         """Move the group's place behind all that was received."""
@@ -162,10 +186,10 @@ class KafkaSink:
         self._key = address.option("key", "tracks")
         self._refused = ""
         self._producer = Producer(
-            _settings(address)
+            _settings(address, self._notices)
             | {"enable.idempotence": True, "linger.ms": 2, "message.max.bytes": _MESSAGE_MOST}
         )
-        _reach(self._producer, address)
+        _reach(self._producer, address, self._notices)
 
     @property
     def too_large(self) -> int:
@@ -196,6 +220,7 @@ class KafkaSink:
 
     def _delivered(self, error: Any, message: Any) -> None:
         if error is None:
+            self._notices.found(self.address)
             return
         if error.code() == KafkaError.MSG_SIZE_TOO_LARGE:
             self._notices.larger(self.address, len(message.value() or b""), None)

@@ -73,6 +73,8 @@ class MqttLink:
         self.client.on_pre_connect = self._on_pre_connect
         self.client.on_socket_open = _send_at_once
         self.client.reconnect_delay_set(*_AGAIN_S)
+        if address.tls is not None:
+            self.client.tls_set_context(address.tls.context())
         if address.user is not None:
             secret = address.password
             self.client.username_pw_set(address.user.reveal(), None if secret is None else secret.reveal())
@@ -126,12 +128,15 @@ class MqttLink:
         else:
             self._since = time.monotonic()
             self._notices.forget()
+            self._notices.found(self._address)
             self.packet_most = getattr(properties, "MaximumPacketSize", PACKET_MOST)
             self.on_connected()
         self._answered.set()
 
     def _on_disconnect(self, client: Any, data: Any, flags: Any, reason: Any, properties: Any) -> None:
         since, self._since = self._since, None
+        if since is not None:
+            self._notices.lost(self._address)
         if reason.value == _TAKEN_OVER:
             self.trouble = (
                 f"another client is called {self._name!r}, too, and has taken this one's place{_REMEDY}"

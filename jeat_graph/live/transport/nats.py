@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import secrets
 import time
 from collections import deque
 from concurrent.futures import Future, wait
@@ -22,6 +23,10 @@ from jeat_graph.live.transport.notices import Notices
 from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedError, check, never
 
 MOST_OPEN = 256
+#: What tells sinks apart within the minutes that a server remembers (bytes); it counts with each message.
+_RUN_BYTES = 4
+#: A number of a message as long as any will be.
+NUMBER_MOST = 10**15
 #: A message that is not acknowledged in this time comes again (s); nothing is left open for as long.
 _ACK_WAIT_S = 600.0
 _CONNECT_S = 10.0
@@ -190,11 +195,16 @@ class NatsSink:
         self._notices = notices or Notices()
         self._most = address.number("most", MOST_OPEN, low=1)
         self._link = NatsLink(address, overdue, self._notices, _CONNECT_S)
-        self._open: deque[tuple[bytes, Any]] = deque()
+        self._open: deque[tuple[bytes, int, Any]] = deque()
         self._reconnects = 0
         self._pause_s = _BACK_OFF_S[0]
+        # By these the server knows what is sent again after a lost connection, and keeps it once.
+        self._run, self._number = secrets.token_hex(_RUN_BYTES), 0
         # The server counts what stands before a message, too.
-        head = f"NATS/1.0\r\n{Header.EXPECTED_STREAM.value}: {self._link.stream}\r\n\r\n"
+        head = (
+            f"NATS/1.0\r\n{Header.EXPECTED_STREAM.value}: {self._link.stream}\r\n"
+            f"{Header.MSG_ID.value}: {self._run}-{NUMBER_MOST}\r\n\r\n"
+        )
         self._head_bytes = len(head.encode())
 
     @property
@@ -210,16 +220,20 @@ class NatsSink:
             self._wait(0)
             self._reconnects = link.reconnects
         self._wait(self._most - 1)
-        self._open.append((message, self._publish(message)))
+        self._number += 1
+        self._open.append((message, self._number, self._publish(message, self._number)))
         self._notices.tell()
 
-    def _publish(self, message: bytes) -> Any:
+    def _publish(self, message: bytes, number: int) -> Any:
         link = self._link
         if len(message) > self._payload_most():
             refused: Future[None] = Future()
             refused.set_exception(MaxPayloadError())
             return refused
-        return link.start(link.jet.publish(self.address.topic, message, timeout=CALL_S, stream=link.stream))
+        headers = {Header.MSG_ID.value: f"{self._run}-{number}"}
+        return link.start(
+            link.jet.publish(self.address.topic, message, timeout=CALL_S, stream=link.stream, headers=headers)
+        )
 
     def _payload_most(self) -> int:
         """Largest message that the server takes (bytes); it may change with a connection."""
@@ -233,7 +247,9 @@ class NatsSink:
         """Wait for the oldest until so many are open; what the server did not confirm is sent again."""
         link = self._link
         while len(self._open) > most:
-            message, future = self._open[0]
+            if self._reconnects != link.reconnects and link.client.is_connected:
+                self._send_again()
+            message, number, future = self._open[0]
             self._notices.tell()
             if not wait([future], SLICE_S).done:
                 check(link.overdue, self.address)
@@ -244,9 +260,18 @@ class NatsSink:
                 self._pause_s = _BACK_OFF_S[0]
             except (NatsError, TimeoutError) as error:
                 self._not_taken(len(message), error)
-                if self._open and self._open[0][1] is future:
-                    self._open[0] = (message, self._publish(message))
+                if self._open and self._open[0][2] is future:
+                    self._open[0] = (message, number, self._publish(message, number))
         self._notices.tell()
+
+    def _send_again(self) -> None:
+        """Send all that is on its way by the new connection; the server keeps what it has already once."""
+        self._reconnects = self._link.reconnects
+        for _, _, future in self._open:
+            future.cancel()
+        self._open = deque(
+            (message, number, self._publish(message, number)) for message, number, _ in self._open
+        )
 
     def _not_taken(self, size: int, error: Exception) -> None:
         """Deal with the oldest message, which the server did not take: drop it, wait a while, or end.
@@ -291,6 +316,6 @@ class NatsSink:
             with contextlib.suppress(UnconfirmedError):
                 self._wait(0)
         finally:
-            for _, future in self._open:
+            for _, _, future in self._open:
                 future.cancel()
             self._link.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import threading
 import time
 from collections.abc import Coroutine
@@ -25,6 +26,17 @@ CONNECT_S, CALL_S = 10.0, 10.0
 _AGAIN_S = 0.5
 _FORBIDDEN = "permissions violation"
 _T = TypeVar("_T")
+
+
+class _NotOurs(logging.Filter):
+    """Passes over what asyncio says of the client each time when an encrypted connection ends."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Tell whether a record is to be told."""
+        return "eof_received" not in record.getMessage()
+
+
+_NOT_OURS = _NotOurs()
 
 
 class NatsLink:
@@ -54,7 +66,8 @@ class NatsLink:
         self.reconnects = 0
         self.forbidden = ""
         self.client: Any = Client()
-        self._connected = False
+        self._connected = self._leaving = False
+        logging.getLogger("asyncio").addFilter(_NOT_OURS)
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
         self._thread.start()
@@ -73,6 +86,11 @@ class NatsLink:
         async def reconnected() -> None:
             self.reconnects += 1
             self.notices.forget()
+            self.notices.found(self.address)
+
+        async def disconnected() -> None:
+            if not self.client.is_closed and not self._leaving:
+                self.notices.lost(self.address)
 
         async def complain(error: Exception) -> None:
             if not self._connected and not failed.done():
@@ -82,10 +100,11 @@ class NatsLink:
             if self._connected and isinstance(error, AuthorizationError):
                 self.notices.once(f"warning: {self.address}: {why(error)}; trying again")
 
-        user, password = self.address.user, self.address.password
+        user, password, tls = self.address.user, self.address.password, self.address.tls
         connecting = asyncio.ensure_future(
             self.client.connect(
-                f"nats://{self.address.server}",
+                f"{'nats' if tls is None else 'tls'}://{self.address.server}",
+                tls=None if tls is None else tls.context(),
                 user=None if user is None else user.reveal(),
                 password=None if password is None else password.reveal(),
                 connect_timeout=patience_s,
@@ -93,6 +112,7 @@ class NatsLink:
                 reconnect_time_wait=_AGAIN_S,
                 allow_reconnect=True,
                 reconnected_cb=reconnected,
+                disconnected_cb=disconnected,
                 error_cb=complain,
             )
         )
@@ -103,6 +123,7 @@ class NatsLink:
             raise failed.result() if failed.done() else TimeoutError
         connecting.result()
         self._connected = True
+        self.notices.found(self.address)
 
     def _stream(self) -> str:
         wanted = self.address.options.get("stream")
@@ -135,6 +156,7 @@ class NatsLink:
 
     def close(self) -> None:
         """Leave; a server that is gone is not waited for."""
+        self._leaving = True
         with contextlib.suppress(NatsError, OSError):
             self.call(self.client.close())
         self.stop()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 
@@ -23,10 +24,15 @@ class Notices:
 
     Attributes:
         too_large: messages that the broker does not take, and which were not sent.
+        connected: whether there is a connection now.
+        reconnects: how often it was mended.
     """
 
     def __init__(self, tell: Tell = say_nothing) -> None:
         self.too_large = 0
+        self.connected = False
+        self.reconnects = 0
+        self._lost_at: float | None = None
         self._tell = tell
         self._lines: deque[str] = deque()
         self._known: set[str] = set()
@@ -44,6 +50,24 @@ class Notices:
     def forget(self) -> None:
         """Let what was told once be told again: it was over meanwhile."""
         self._known.clear()
+
+    def found(self, where: object) -> None:
+        """Keep that there is a connection, for the first time or again."""
+        if self.connected:
+            return
+        self.connected = True
+        if self._lost_at is None:
+            self.add(f"{where}: connected")
+            return
+        self.reconnects += 1
+        self.add(f"{where}: connected again, after {time.monotonic() - self._lost_at:.1f} s")
+
+    def lost(self, where: object, why: str = "") -> None:
+        """Keep that the connection is lost, and is being mended."""
+        if self.connected:
+            self.connected, self._lost_at = False, time.monotonic()
+            reason = f" ({why})" if why else ""
+            self.add(f"warning: {where}: the connection is lost{reason}; trying again until it is back")
 
     def larger(self, where: object, size: int, most: int | None) -> None:
         """Keep that a message was not sent because it is larger than the broker takes.

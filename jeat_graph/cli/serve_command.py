@@ -1,0 +1,33 @@
+"""`jeat-graph serve`: cameras or brokers tracked for months, as one file describes it."""
+
+from __future__ import annotations
+
+import argparse
+
+HELP = "run as a service that one file describes: sources, detectors, tracker, sinks, health and metrics"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of the command."""
+    parser.description = HELP + (
+        ". It says what happens as lines of JSON on stderr, and ends on SIGTERM with all in order. Example: "
+        "jeat-graph serve gantry7.yaml"
+    )
+    parser.add_argument("service", metavar="CONFIG.yaml", help="the file; docs/guides/service.md explains it")
+    parser.add_argument("--check", action="store_true", help="only read the file and say whether it is valid")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until a signal comes."""
+    from jeat_graph.live.service.config import read_service
+    from jeat_graph.live.service.log import WARNING, Log
+    from jeat_graph.live.service.run import Service
+
+    config, warnings = read_service(args.service)
+    log = Log(config.name)
+    for text in warnings:
+        log.write(WARNING, text)
+    if args.check:
+        print(f"{args.service}: valid: {len(config.sources)} sources, {len(config.sinks)} sinks")
+        return 0
+    return Service(config, log).run()

@@ -1,0 +1,166 @@
+"""The brokers of a service: opened for as long as it takes, and all tracks to all of them."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from typing import TypeVar
+
+from jeat_graph.data.errors import ConfigError, JeatGraphError
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.capture.back_off import BackOff
+from jeat_graph.io.track_lines import json_line
+from jeat_graph.live.health import HealthChange
+from jeat_graph.live.messages import ScanMessage, encode_tracks
+from jeat_graph.live.service.config import STDOUT, ServiceConfig, full_url
+from jeat_graph.live.service.log import Log
+from jeat_graph.live.service.status import EndStatus, Status
+from jeat_graph.live.transport.ends import Sink, Source, open_sink, open_source, sink_address, source_address
+from jeat_graph.live.transport.notices import Notices
+from jeat_graph.live.transport.patience import Overdue
+
+_SLICE_S = 0.1
+_End = TypeVar("_End")
+
+
+class OpenedSource:
+    """A source and how it is doing."""
+
+    def __init__(self, source: Source, status: EndStatus) -> None:
+        self.source, self.status = source, status
+        self.number = 0  # of messages that have come
+        self.open = 0  # of those that are not committed
+
+
+class Sinks:
+    """All places that tracks go to.
+
+    Args:
+        status: of the service.
+
+    Attributes:
+        seq: number of the next message.
+    """
+
+    def __init__(self, status: Status) -> None:
+        self.seq = 0
+        self._status = status
+        self._opened: list[tuple[Sink, str, EndStatus]] = []
+        self._stdout = False
+
+    def add(self, sink: Sink, encoding: str, status: EndStatus) -> None:
+        """Send tracks there, too."""
+        self._opened.append((sink, encoding, status))
+
+    def add_stdout(self) -> None:
+        """Write tracks to standard output, too."""
+        self._stdout = True
+
+    def send(self, t: float, table: Trajectories, message: ScanMessage) -> None:
+        """Give out the tracks after an arrival."""
+        self._send(json_line(t, table), message)
+
+    def event(self, event: HealthChange) -> None:
+        """Give out that a sensor fails or is well again."""
+        line = json.dumps({"t": event.t, "event": f"sensor-{event.what}", "sensor": event.sensor})
+        self._send(line, None)
+
+    def _send(self, line: str, message: ScanMessage | None) -> None:
+        for sink, encoding, status in self._opened:
+            sink.send(encode_tracks(line, self.seq, message, encoding))
+            status.messages += 1
+        if self._stdout:
+            sys.stdout.write(encode_tracks(line, self.seq, message, "json").decode().rstrip("\n") + "\n")
+            sys.stdout.flush()
+        self.seq += 1
+
+    def flush(self) -> None:
+        """Wait until all have arrived."""
+        for sink, _, _ in self._opened:
+            sink.flush()
+
+    def too_large(self) -> int:
+        """How many answers were not sent because of their size."""
+        return sum(sink.too_large for sink, _, _ in self._opened)
+
+    def close(self) -> None:
+        """Leave all of them."""
+        for sink, _, _ in self._opened:
+            sink.close()
+
+
+def open_sinks(
+    config: ServiceConfig, status: Status, log: Log, stop: Callable[[], bool], overdue: Overdue
+) -> Sinks:
+    """Open all sinks; those that do not answer are tried again until they do, or the service is to stop."""
+    sinks = Sinks(status)
+    for one in config.sinks:
+        if one.url == STDOUT:
+            sinks.add_stdout()
+            continue
+        url = full_url(one.url, one.password_file, one.tls)
+        notices = Notices(log.say)
+        end = EndStatus(str(sink_address(url)), notices)
+        status.sinks.append(end)
+
+        def open_it(url: str = url, notices: Notices = notices) -> Sink:
+            return open_sink(url, overdue, notices=notices)
+
+        opened = _until_opened(open_it, end, log, stop, status)
+        if opened is not None:
+            sinks.add(opened, one.encoding, end)
+    return sinks
+
+
+def open_sources(
+    config: ServiceConfig, status: Status, log: Log, stop: Callable[[], bool], overdue: Overdue
+) -> list[OpenedSource]:
+    """Open all sources of brokers, as `open_sinks` does."""
+    found = []
+    for one in config.sources:
+        if one.url is None:
+            continue
+        url = full_url(one.url, one.password_file, one.tls)
+        notices = Notices(log.say)
+        end = EndStatus(str(source_address(url)), notices)
+        status.sources.append(end)
+
+        def open_it(url: str = url, notices: Notices = notices) -> Source:
+            return open_source(url, overdue, notices=notices)
+
+        opened = _until_opened(open_it, end, log, stop, status)
+        if opened is not None:
+            found.append(OpenedSource(opened, end))
+    return found
+
+
+def _until_opened(
+    open_it: Callable[[], _End], end: EndStatus, log: Log, stop: Callable[[], bool], status: Status
+) -> _End | None:
+    """Try until it opens; None if the service is to stop before.
+
+    Raises:
+        ConfigError: no further attempt would mend it.
+    """
+    back_off = BackOff()
+    while not stop():
+        status.alive()
+        try:
+            opened = open_it()
+        except ConfigError:
+            raise
+        except JeatGraphError as error:
+            pause_s = back_off.failed()
+            end.trouble = str(error).removeprefix(f"{end.name}: ")
+            log.say(f"warning: {error}; trying again in {pause_s:g} s")
+            until = time.monotonic() + pause_s
+            while time.monotonic() < until and not stop():
+                status.alive()
+                time.sleep(_SLICE_S)
+            continue
+        end.trouble = ""
+        end.notices.tell()
+        return opened
+    return None

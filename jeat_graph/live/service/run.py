@@ -1,0 +1,289 @@
+"""A service from its start to a signal: opens what its file names, tracks, and leaves in good order."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from jeat_graph.config.reading import load_config
+from jeat_graph.config.schema import Config
+from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError, TimeOrderError, UnknownSensorError
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.locking import hold_file
+from jeat_graph.io.scan_batch import ScanBatch
+from jeat_graph.io.stream_reading import StreamReading
+from jeat_graph.live.interrupts import Interrupts
+from jeat_graph.live.late import LiveTracker
+from jeat_graph.live.messages import ScanMessage, decode_scans
+from jeat_graph.live.service.cameras import Cameras
+from jeat_graph.live.service.config import ServiceConfig
+from jeat_graph.live.service.ends import OpenedSource, Sinks, open_sinks, open_sources
+from jeat_graph.live.service.log import ERROR, INFO, Log
+from jeat_graph.live.service.status import RUNNING, STOPPING, Status
+from jeat_graph.live.service.systemd import Watchdog, notify
+from jeat_graph.live.service.web import Web
+from jeat_graph.live.session import Ends, Session
+from jeat_graph.live.smoothed_file import SmoothedFile
+from jeat_graph.live.told import BadLines
+from jeat_graph.live.transport.patience import UnconfirmedError
+from jeat_graph.tracking.tracker import Tracker
+
+#: How long one source is waited for, alone or beside others (s).
+_ALONE_S, _BESIDE_S = 0.2, 0.05
+#: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
+_COMMIT_PART = 0.5
+#: So many messages of one source are taken before the next one's turn.
+_IN_A_ROW = 16
+#: Exit codes: ended as asked; ended by trouble that a new start may mend.
+DONE, TROUBLE = 0, 1
+
+
+@dataclass
+class _Running:
+    """What a service works with once all is open."""
+
+    session: Session
+    sources: list[OpenedSource]
+    cameras: Cameras
+    sinks: Sinks
+    bad: BadLines
+    reading: StreamReading = field(default_factory=lambda: StreamReading(goes_on=True))
+
+
+class Service:
+    """Runs what a file describes.
+
+    Args:
+        config: of the service.
+        log: takes what is to be said.
+    """
+
+    def __init__(self, config: ServiceConfig, log: Log) -> None:
+        self._config, self._log = config, log
+        self.status = Status(config.name, config.silent_s)
+        self._interrupts = Interrupts()
+
+    def run(self) -> int:
+        """Track until a signal comes.
+
+        Returns:
+            0 after a signal, 1 after trouble that a new start may mend.
+
+        Raises:
+            ConfigError: a file, a setting or an address that is not valid, or an old checkpoint.
+        """
+        config, log, status = self._config, self._log, self.status
+        with ExitStack() as stack:
+            stack.enter_context(self._interrupts)
+            stack.enter_context(log.of_libraries())
+            for path in (config.state.checkpoint, config.state.smoothed):
+                if path is not None:
+                    stack.enter_context(hold_file(path))
+            tracker = config.tracker  # what is wrong of these is known before anything is opened
+            load_config(tracker.config, list(tracker.set), tracker.rig)
+            self._saved_tracker(None)
+            if config.web.port:
+                web = stack.enter_context(Web(config.web.host, config.web.port, status))
+                log.write(INFO, f"/health and /metrics at http://{config.web.host}:{web.port}")
+            stack.enter_context(Watchdog(status.quiet_s))
+            stack.callback(notify, "STOPPING=1")
+            cameras = Cameras(config, status, log, stack)
+            notify("READY=1\nSTATUS=waiting for sources and sinks")
+            try:
+                return self._serve(cameras, stack)
+            except ConfigError:
+                raise
+            except (JeatGraphError, OSError) as error:
+                log.write(ERROR, f"ends: {error}; a new start goes on from the checkpoint")
+                return TROUBLE
+
+    def _stopped(self) -> bool:
+        self.status.alive()
+        return self._interrupts.seen is not None
+
+    def _overdue(self) -> bool:
+        """Asked by brokers in each slice of a wait, so that a long wait is no sign of death."""
+        self.status.alive()
+        return self._interrupts.overdue()
+
+    def _serve(self, cameras: Cameras, stack: ExitStack) -> int:
+        log, status, config = self._log, self.status, self._config
+        sinks = open_sinks(config, status, log, self._stopped, self._overdue)
+        stack.callback(sinks.close)
+        sources = open_sources(config, status, log, self._stopped, self._overdue)
+        for one in sources:
+            stack.callback(one.source.close)
+        cameras.prepare(self._stopped)
+        if self._stopped():
+            return DONE
+        settings = self._tracker_config(cameras)
+        live, more = self._saved_tracker(settings) or (
+            LiveTracker(Tracker(settings), config.tracker.late),
+            {},
+        )
+        if more:
+            log.write(INFO, f"goes on from {config.state.checkpoint}")
+        smoothed = None
+        if config.state.smoothed is not None:
+            smoothed = stack.enter_context(SmoothedFile(config.state.smoothed, more.get("smoothed")))
+        session = Session(
+            live,
+            Ends(
+                tracks=self._answering(sinks),
+                event=sinks.event,
+                warn=log.say,
+                smoothed=smoothed,
+                flush=sinks.flush,
+                commit=lambda: _commit(sources),
+                too_large=sinks.too_large,
+                kept=lambda: self._saved(sinks),
+            ),
+            config.state.checkpoint,
+            config.state.every_s,
+            more,
+        )
+        sinks.seq = more.get("kept", {}).get("seq", 0)
+        running = _Running(session, sources, cameras, sinks, BadLines(log.say))
+        cameras.begin()
+        status.phase = RUNNING
+        notify("STATUS=running")
+        log.write(INFO, "running", messages_before=session.count)
+        with contextlib.suppress(UnconfirmedError):  # after a signal; the session tells of it
+            try:
+                self._work(running)
+            finally:
+                self._leave(session)
+        return DONE
+
+    def _tracker_config(self, cameras: Cameras) -> Config:
+        tracker = self._config.tracker
+        image = tracker.image or (cameras.size_px if tracker.rig is None else None)
+        sides = [] if image is None else [f"image.width={image[0]}", f"image.height={image[1]}"]
+        declared = cameras.settings(self._log) if tracker.config == "default" else []
+        made = load_config(tracker.config, [*declared, *tracker.set, *sides], tracker.rig)
+        if self._config.state.smoothed is None:
+            return replace(made, smoother=replace(made.smoother, engine="none"))
+        if made.smoother.engine == "none":
+            raise ConfigError("state.smoothed needs a smoother, but smoother.engine is none")
+        return made
+
+    def _saved_tracker(self, settings: Config | None) -> tuple[LiveTracker, dict[str, Any]] | None:
+        """The tracker from the checkpoint, and what was kept with it; None if there is none to go on from.
+
+        Raises:
+            ConfigError: it cannot be gone on from, and is not to be set aside.
+        """
+        state, late = self._config.state, self._config.tracker.late
+        path = state.checkpoint
+        if path is not None and Path(path).is_file():
+            try:
+                # Without settings it is only looked whether the file can be gone on from at all.
+                live, more = LiveTracker.load(path, settings)
+                if live.policy != late:
+                    raise ConfigError(f"{path}: was saved with late: {live.policy}, not {late}")
+                return live, more
+            except JeatGraphError as error:
+                if state.of_another_version == "refuse":
+                    raise ConfigError(
+                        f"{error}; or let `state.of_another_version: set-aside` rename it and begin anew"
+                    ) from None
+                aside = f"{path}.{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}"
+                Path(path).replace(aside)
+                self._log.say(f"warning: {error}; it is {aside} now, and the tracker begins anew")
+        return None
+
+    def _answering(self, sinks: Sinks) -> Any:
+        status = self.status
+
+        def answer(t: float, table: Trajectories, message: ScanMessage, _: float) -> None:
+            sinks.send(t, table, message)
+            status.answered(t, len(table), time.monotonic() - self._came)
+
+        return answer
+
+    def _saved(self, sinks: Sinks) -> dict[str, Any]:
+        """Return what is to be kept beside the session's own state, which is being written."""
+        self.status.saved = time.monotonic()
+        self.status.counted.checkpoints += 1
+        return {"seq": sinks.seq}
+
+    def _work(self, running: _Running) -> None:
+        """Take what comes until a signal."""
+        several = len(running.sources) + bool(running.cameras) > 1
+        wait_s = _BESIDE_S if several else _ALONE_S
+        while not self._stopped():
+            # Where one has much, nobody waits for the others.
+            busy = False
+            for one in running.sources:
+                taken = 0
+                while taken < _IN_A_ROW and self._take_from(one, running, wait_s):
+                    taken += 1
+                busy = busy or taken > 0
+            if running.cameras:
+                scan = running.cameras.take(0.0 if busy else wait_s)
+                while scan is not None and not self._stopped():
+                    self._take(ScanMessage(ScanBatch([scan], [1]), "", None), "camera:1: ", running)
+                    scan = running.cameras.take(0.0)
+
+    def _take_from(self, one: OpenedSource, running: _Running, wait_s: float) -> bool:
+        """Take the next message of a broker, and tell it what has been taken; whether there was one."""
+        payload = one.source.receive(wait_s)
+        if payload is not None:
+            one.number += 1
+            one.open += 1
+            one.status.messages += 1
+            place = f"{one.status.name}:{one.number}: "
+            try:
+                message = decode_scans(payload, one.status.name, one.number, running.reading)
+            except DataError as error:
+                self._bad(error, running)
+                message = None
+            if message is not None:
+                self._take(message, place, running)
+        if one.open and (payload is None or one.open >= _COMMIT_PART * one.source.most_open):
+            running.session.save()
+        return payload is not None
+
+    def _take(self, message: ScanMessage, place: str, running: _Running) -> None:
+        self._came = time.monotonic()
+        session, counted = running.session, self.status.counted
+        counted.taken += 1
+        before = session.duplicates
+        try:
+            session.accept(message, place)
+        except (DataError, UnknownSensorError, TimeOrderError) as error:
+            if isinstance(error, DataError) and error.path is not None:
+                raise  # of a file that is written, not of the message
+            name, _, line = place.removesuffix(": ").rpartition(":")
+            self._bad(DataError(str(error), name, int(line)), running)
+        counted.duplicates = session.duplicates
+        if session.duplicates == before:
+            self.status.came(message.batch.scans)
+        counted.passed_over = int(session.live.lateness.dropped.sum())
+
+    def _bad(self, error: DataError, running: _Running) -> None:
+        if self._config.on_error == "stop":
+            raise error
+        running.session.bad += 1
+        self.status.counted.unreadable += 1
+        running.bad.add(error, running.session.count)
+
+    def _leave(self, session: Session) -> None:
+        """Save what is known, whatever ended it."""
+        self.status.phase = STOPPING
+        try:
+            session.save()
+        finally:  # a broker that takes no more is no reason to lose what is smoothed
+            session.finish()
+        seen = self._interrupts.seen
+        self._log.write(INFO, "ends" if seen is None else f"ends, by signal {seen}", messages=session.count)
+
+
+def _commit(sources: list[OpenedSource]) -> None:
+    for one in sources:
+        one.source.commit()
+        one.open = 0

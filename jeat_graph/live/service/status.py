@@ -1,0 +1,214 @@
+"""How a service is doing: can be asked from outside at any moment, whatever its main thread waits for."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from jeat_graph.data.detections import Scan
+from jeat_graph.io.capture.reader import LiveStatus
+from jeat_graph.live.transport.notices import Notices
+from jeat_graph.version import __version__
+
+STARTING, RUNNING, STOPPING = "starting", "running", "stopping"
+#: Times that are so far (s) from the clock of this machine are of another clock.
+_OTHER_CLOCK_S = 86_400.0
+
+
+@dataclass
+class EndStatus:
+    """A broker that scans come from or tracks go to.
+
+    Attributes:
+        name: its address, as it may be shown.
+        notices: know whether there is a connection.
+        messages: that came or went.
+        trouble: why it cannot be opened, or empty.
+    """
+
+    name: str
+    notices: Notices
+    messages: int = 0
+    trouble: str = ""
+
+    @property
+    def problem(self) -> str:
+        """Why it is not ready, or empty."""
+        if self.notices.connected:
+            return ""
+        return f"{self.name}: not connected{f' ({self.trouble})' if self.trouble else ''}"
+
+    def shown(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "name": self.name,
+            "connected": self.notices.connected,
+            "reconnects": self.notices.reconnects,
+            "messages": self.messages,
+            "trouble": self.trouble,
+        }
+
+
+@dataclass
+class SensorStatus:
+    """What has come of a sensor.
+
+    Attributes:
+        t: time of its newest scan (s).
+        seen: when that came (s, of `time.monotonic`).
+        scans: how many came.
+        boxes: in them.
+    """
+
+    t: float
+    seen: float
+    scans: int = 0
+    boxes: int = 0
+
+
+@dataclass
+class Counted:
+    """What is counted over the life of the process."""
+
+    taken: int = 0
+    answered: int = 0
+    unreadable: int = 0
+    duplicates: int = 0
+    passed_over: int = 0
+    checkpoints: int = 0
+
+
+@dataclass
+class Status:
+    """The state of a service; written by its threads, read by those that answer questions.
+
+    Attributes:
+        name: of the service.
+        silent_s: a sensor without a scan for so long (s) makes it not ready.
+        phase: `starting`, `running` or `stopping`.
+        sources: brokers that scans come from.
+        sinks: brokers that tracks go to.
+        cameras: those that are looked at here.
+        sensors: by name what has come of them.
+        counted: what is counted.
+        lag_s: how long after its own time the newest scan was answered (s), or None.
+        tracks: how many are reported now.
+        saved: when the newest checkpoint was written (s, of `time.monotonic`), or None.
+        beat: when the main thread last did something (s, of `time.monotonic`).
+        detectors_beat: tells the same of the detectors, of that which was silent for longest.
+    """
+
+    name: str
+    silent_s: float
+    phase: str = STARTING
+    sources: list[EndStatus] = field(default_factory=list)
+    sinks: list[EndStatus] = field(default_factory=list)
+    cameras: list[LiveStatus] = field(default_factory=list)
+    sensors: dict[str, SensorStatus] = field(default_factory=dict)
+    counted: Counted = field(default_factory=Counted)
+    lag_s: float | None = None
+    tracks: int = 0
+    saved: float | None = None
+    beat: float = field(default_factory=time.monotonic)
+    detectors_beat: Callable[[], float] = time.monotonic
+    _since: float = field(default_factory=time.monotonic)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def alive(self) -> None:
+        """Note that the main thread does something."""
+        self.beat = time.monotonic()
+
+    def quiet_s(self) -> float:
+        """For how long (s) the part that was quiet for longest has done nothing."""
+        return time.monotonic() - min(self.beat, self.detectors_beat())
+
+    def came(self, scans: Iterable[Scan]) -> None:
+        """Note scans that have come."""
+        now = time.monotonic()
+        with self._lock:
+            for scan in scans:
+                one = self.sensors.setdefault(scan.sensor, SensorStatus(scan.t, now))
+                one.t, one.seen = max(one.t, scan.t), now
+                one.scans += 1
+                one.boxes += len(scan)
+
+    def answered(self, t: float, tracks: int, processing_s: float) -> None:
+        """Note an answer.
+
+        Args:
+            t: time of the scans (s).
+            tracks: how many are reported.
+            processing_s: from the message's coming to the answer's going (s).
+        """
+        self.counted.answered += 1
+        self.tracks = tracks
+        behind_s = time.time() - t
+        self.lag_s = behind_s if abs(behind_s) < _OTHER_CLOCK_S else processing_s
+
+    @property
+    def dropped(self) -> int:
+        """Pictures that no detector had time for, and scans that were passed over."""
+        return sum(camera.dropped for camera in self.cameras) + self.counted.passed_over
+
+    def problems(self) -> list[str]:
+        """Return why the service is not ready: a line for each reason."""
+        now = time.monotonic()
+        found = [] if self.phase == RUNNING else [f"is {self.phase}"]
+        found += [end.problem for end in (*self.sources, *self.sinks) if end.problem]
+        found += [
+            f"{camera.name}: not connected{f' ({camera.trouble})' if camera.trouble else ''}"
+            for camera in self.cameras
+            if not camera.connected
+        ]
+        found += [
+            f"sensor {name!r}: no scan for {now - one.seen:.0f} s"
+            for name, one in self._copied().items()
+            if now - one.seen > self.silent_s
+        ]
+        return found
+
+    def health(self) -> dict[str, Any]:
+        """Return what `/health` says, as plain data."""
+        now, problems = time.monotonic(), self.problems()
+        return {
+            "ready": not problems,
+            "problems": problems,
+            "name": self.name,
+            "version": __version__,
+            "phase": self.phase,
+            "up_s": round(now - self._since, 1),
+            "sensors": {
+                name: {
+                    "last_scan": one.t,
+                    "age_s": round(now - one.seen, 3),
+                    "scans": one.scans,
+                    "boxes": one.boxes,
+                }
+                for name, one in self._copied().items()
+            },
+            "lag_s": None if self.lag_s is None else round(self.lag_s, 4),
+            "dropped": self.dropped,
+            "tracks": self.tracks,
+            "messages": vars(self.counted),
+            "checkpoint_age_s": None if self.saved is None else round(now - self.saved, 1),
+            "sources": [one.shown() for one in self.sources],
+            "sinks": [one.shown() for one in self.sinks],
+            "cameras": [
+                {
+                    "name": camera.name,
+                    "connected": camera.connected,
+                    "pictures": camera.taken,
+                    "dropped": camera.dropped,
+                    "reconnects": camera.reconnects,
+                    "trouble": camera.trouble,
+                }
+                for camera in self.cameras
+            ],
+        }
+
+    def _copied(self) -> dict[str, SensorStatus]:
+        with self._lock:
+            return dict(self.sensors)
