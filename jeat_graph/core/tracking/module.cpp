@@ -1,4 +1,5 @@
 // Binds the tracker's step.
+#include <array>
 #include <optional>
 
 #include <nanobind/stl/optional.h>
