@@ -122,6 +122,15 @@ def test_a_speed_is_stated_once_it_is_known() -> None:
     assert np.abs(found[known, 1] - 79.2).max() < 3.0 * RoadFilterConfig().known_kmh
 
 
+def test_sensors_need_not_be_known_beforehand_and_their_noise_is_taken_as_it_is_recorded() -> None:
+    """Which of its sensors a tracker met first is nothing to the road, and `scale` is in the variances already."""
+    rows = _log(np.random.default_rng(5), 0.7)
+    last, scaled = rows.copy(), rows.copy()
+    last["sensor"], scaled["scale"] = 62, 0.2
+    for other in (last, scaled):
+        np.testing.assert_array_equal(_follow(rows), _follow(other))
+
+
 def test_what_the_table_says_of_a_state_is_its_transform() -> None:
     """Speed, heading and their variances against derivatives by central differences of the whole state."""
     rng = np.random.default_rng(6)

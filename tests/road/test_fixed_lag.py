@@ -149,3 +149,27 @@ def test_what_never_makes_a_vehicle_is_not_kept_for_ever() -> None:
     (track,) = smoother._tracks.values()
     assert track.window is None
     assert 95 <= sum(len(part) for part in track.waiting) <= 101
+
+
+def _seen_by_two(log: np.ndarray, since_s: float) -> np.ndarray:
+    """The same drive, every other box of another sensor from some time on."""
+    log = log.copy()
+    log["sensor"] = (log["t"] > since_s) & (np.arange(len(log)) % 2 == 1)
+    log["coloured_std"] = PX / 2.0
+    return log
+
+
+def test_a_sensor_that_comes_later_is_one_that_has_told_nothing_so_far() -> None:
+    """As if it had been known from the beginning, here by a box of another track."""
+    log = _seen_by_two(_log(8), 1.6)
+    other = _log(9, identity=2)[:1]
+    other["sensor"] = 1
+    steps, end = _follow(log, RoadLagConfig())
+    known, known_end = _follow(np.concatenate([other, log]), RoadLagConfig())
+    found, expected = np.concatenate([*steps, end]), np.concatenate([*known, known_end])
+    expected = expected[expected["track_id"] == 1]
+    assert len(found) > 8
+    np.testing.assert_array_equal(found["t"], expected["t"])
+    deviation = np.sqrt(expected["var"])
+    assert (np.abs(found["mean"] - expected["mean"]) < 0.01 * deviation).all()
+    np.testing.assert_allclose(found["var"], expected["var"], rtol=1e-3)
