@@ -123,7 +123,7 @@ def test_a_speed_is_stated_once_it_is_known() -> None:
 
 
 def test_sensors_need_not_be_known_beforehand_and_their_noise_is_taken_as_it_is_recorded() -> None:
-    """Which of its sensors a tracker met first is nothing to the road, and `scale` is in the variances already."""
+    """The number of a sensor is nothing to the road, and `scale` is in the variances already."""
     rows = _log(np.random.default_rng(5), 0.7)
     last, scaled = rows.copy(), rows.copy()
     last["sensor"], scaled["scale"] = 62, 0.2
@@ -194,7 +194,7 @@ def test_a_track_without_a_box_is_forgotten_and_begins_anew() -> None:
 
 
 def test_boxes_that_come_at_once_tell_nothing_new() -> None:
-    """Leaving out those within a share of their errors' memory changes little, where a part of these lasts."""
+    """Leaving out those within a share of their errors' memory changes little where these last."""
     rows = _log(np.random.default_rng(7), 0.7)
     lasting = LASTING_SHARE * rows["r"]
     rows["coloured_std"], rows["r"] = np.sqrt(lasting), rows["r"] - lasting

@@ -29,7 +29,7 @@ def _records(boxes: np.ndarray, scale: np.ndarray, born: bool = False) -> np.nda
     hnp.arrays(np.float64, (4, 2), elements=st.floats(1.0, 2000.0)),
     hnp.arrays(np.float64, 4, elements=st.floats(0.04, 20.0)),
 )
-def test_noise_is_that_of_the_filter_s_measurement_of_each_sensor(size: np.ndarray, scale: np.ndarray) -> None:
+def test_noise_is_that_with_which_the_filter_measures(size: np.ndarray, scale: np.ndarray) -> None:
     """The centre is the mean of two sides, ln size their difference; what lasts is that of `singer`."""
     rows = _records(np.concatenate([np.full((4, 2), 50.0), size], axis=1), scale)
     for row, one, s in zip(rows, size, scale.tolist(), strict=True):
