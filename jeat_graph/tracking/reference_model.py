@@ -285,6 +285,8 @@ class ReferenceModel:
             real = np.where(final[ids] > c.sure, np.maximum(moment.real, final[ids]), moment.real)
             nearer = np.minimum(moment.t - before[number], seen_next[ids] - moment.t)
             real = np.where(found, real, real * gap_survival.survival(self._state.gaps, nearer, c))
+            if number + 1 < len(self._steps) and self._steps[number + 1].t == moment.t:
+                continue  # a later step of the same time tells more
             told[int(last_records[number])] = moment, np.where(np.isinf(seen_next[ids]), 0.0, real)
         parts = []
         for record, mean, covariance in smooth([one for taken in self._steps for one in taken.records]):

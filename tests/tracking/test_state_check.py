@@ -106,19 +106,21 @@ def test_a_pipe_is_not_waited_for(tmp_path):
         Tracker.load(tmp_path / "state.npz")
 
 
-# Written anew with the right check sum: by hand, or by a program that was broken.
-WRONG = {
-    "cov": [np.nan, 0.0, np.inf],
-    "size_cov": [np.nan, 0.0],
-    "mean": [np.nan, np.inf],
-    "existence": [np.nan, -0.5, 2.0],
-    "track_id": [0, -1],
-    "scale": [0.0, -1.0, np.nan],
-    "t_update": [np.nan, np.inf],
-}
-
-
-@pytest.mark.parametrize("key", ["now", "smoothing", "finished", "diagnostics", "log", "past"])
+@pytest.mark.parametrize(
+    "key",
+    [
+        "model",
+        "sensors",
+        "classes",
+        "looks",
+        "order",
+        "boxes",
+        "class_ids",
+        "called",
+        "finished",
+        "diagnostics",
+    ],
+)
 def test_a_state_without_a_part_is_refused(tracker, tmp_path, key):
     state = {name: value for name, value in tracker.state().items() if name != key}
     save_state(tmp_path / "s.npz", tracker.config, state)
