@@ -35,7 +35,7 @@ SEED = 7
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
-    add_config(parser, "highway", settings=False)
+    add_config(parser, settings=False)
     simulated = parser.add_argument_group("beyond the recording that comes along (needs jeat-graph-sehn)")
     add = simulated.add_argument
     add("--scenario", metavar="NAME", help=f"a scenario of `simulate` (default {SCENARIO})")
@@ -91,18 +91,20 @@ def _recording(args: argparse.Namespace) -> DemoRecording:
 
 def _show(args: argparse.Namespace, out: Path) -> None:
     """Track a recording and judge the tracks, and draw them."""
-    from jeat_graph.config.reading import load_config
+    from jeat_graph.config.reading import as_config
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.io.truth_io import write_truth
+    from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections
     from jeat_graph.runs.inputs import describe_inputs
     from jeat_graph.runs.run_options import RunOptions, RunRecord
     from jeat_graph.runs.tracking_run import write_run
 
-    config = load_config(args.config)
+    config = as_config(args.config)
     recording = _recording(args)
+    config, _ = fit_input(as_config(config, (recording.width, recording.height)), recording.detections)
     directory = RunDirectory(out / "run")
     warnings = check_detections(recording.detections, config, recording.name)
     source = out / "detections.csv"

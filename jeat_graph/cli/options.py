@@ -51,7 +51,7 @@ def add_config(parser: argparse.ArgumentParser, default: str = "default", *, set
     add = parser.add_argument
     add("--config", default=default, metavar="NAME|FILE", help=f"preset or YAML file (default: {default})")
     if settings:
-        add_settings(parser, "lifecycle.confirm_existence=0.9")
+        add_settings(parser, "sensors.rgb.even_score=0.4")
 
 
 def add_settings(parser: argparse.ArgumentParser, example: str) -> None:

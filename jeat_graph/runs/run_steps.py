@@ -20,7 +20,6 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory
-from jeat_graph.runs.latency import late_clocks
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.damage import refusing_damage
@@ -189,11 +188,7 @@ class RunSteps:
         record.timings["step_median_ms"] = round(1e3 * float(np.median(step_s)), 4)
         record.timings["step_p99_ms"] = round(1e3 * float(np.quantile(step_s, 0.99)), 4)
         record.counts |= {"tracks_born": self._tracker.num_born, "tracks_reported": len(self._reported)}
-        states = self._tracker.sensor_states()
-        record.learnt = {name: one._asdict() for name, one in states.items()}
-        for line in late_clocks(states):
-            record.warnings.append(line)
-            warnings.warn(line, InputWarning, stacklevel=2)
+        record.learnt = {name: one._asdict() for name, one in self._tracker.sensor_states().items()}
         record.counts["causal_rows"] = self._rows["causal"]
         detections = len(self._detections)
         if detections >= _MANY and self._rows["causal"] < _LEAST_TRACKED * detections:
