@@ -87,7 +87,7 @@ def test_track_has_a_bar_for_the_smoothing_at_the_end(recording, tmp_path, monke
 
 @pytest.mark.parametrize("smoother", ["fixed-lag", "rts"])
 def test_a_tracker_tells_how_many_tracks_it_has_smoothed(smoother, recording):
-    tracker = Tracker(load_config("highway", [f"smoother.engine={smoother}"]))
+    tracker = Tracker(load_config("default", [f"smoother.engine={smoother}"]))
     for _ in tracker.run(read_detections(recording / "detections.csv")):
         pass
     shares: list[float] = []
@@ -111,7 +111,7 @@ def moves(work: Callable[[], object]) -> list[float]:
 def test_judging_and_comparing_tell_how_far_they_are(recording, small_plots, tmp_path):
     run = tmp_path / "run"
     truth = str(recording / "gt.csv")
-    assert main(["track", str(recording / "detections.csv"), "--out", str(run), "--config", "highway"]) == 0
+    assert main(["track", str(recording / "detections.csv"), "--out", str(run)]) == 0
     assert len(moves(lambda: load_run_data(run, truth))) >= 8
     assert len(moves(lambda: render_page(load_run_data(run)))) > 10  # as many as there are tracks
     measured = measured_run(run)
