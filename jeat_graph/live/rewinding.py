@@ -19,7 +19,7 @@ from jeat_graph.tracking.tracker import Tracker
 
 
 @dataclass
-class TakenStep:
+class ReplayableStep:
     """A step that may still be taken again, of M detections.
 
     Attributes:
@@ -41,7 +41,7 @@ class Mark(NamedTuple):
     """What `Rewinding.go_back` takes."""
 
     now: ModelSnapshot
-    steps: list[TakenStep]
+    steps: list[ReplayableStep]
     replayed: int
     identities: dict[str, Any]
 
@@ -61,7 +61,7 @@ class Rewinding:
 
     def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
-        self.steps: list[TakenStep] = []
+        self.steps: list[ReplayableStep] = []
         self.replayed = 0
         self.settled = -math.inf
         self.identities = Identities(*tracker.living())
@@ -89,7 +89,7 @@ class Rewinding:
         before = later[0].before if later else now
         if later:
             tracker.restore(before)
-        step = TakenStep(t, _by_sensor(scans), before, None, _nobody(scans))
+        step = ReplayableStep(t, _by_sensor(scans), before, None, _nobody(scans))
         if later and later[0].t == t:
             step = _joined(self.steps.pop(k), step)
         self.steps.insert(k, step)
@@ -151,7 +151,7 @@ class Rewinding:
         for scans, known in zip(state["steps"], state["known"], strict=True):
             before = self._tracker.snapshot()
             taken = self._tracker.take_in(scans)
-            self.steps.append(TakenStep(scans[0].t, scans, before, taken, known))
+            self.steps.append(ReplayableStep(scans[0].t, scans, before, taken, known))
         self.identities = Identities.from_state(state["identities"])
 
 
@@ -164,9 +164,9 @@ def _nobody(scans: list[Scan]) -> IntArray:
     return np.zeros(sum(len(scan) for scan in scans), dtype=np.int64)
 
 
-def _joined(old: TakenStep, more: TakenStep) -> TakenStep:
+def _joined(old: ReplayableStep, more: ReplayableStep) -> ReplayableStep:
     """A step of the scans of two, of other sensors at one time; what is known of detections stays."""
     scans = _by_sensor(old.scans + more.scans)
     known = _nobody(scans)
     known[np.repeat([scan in old.scans for scan in scans], [len(scan) for scan in scans])] = old.known
-    return TakenStep(old.t, scans, more.before, None, known)
+    return ReplayableStep(old.t, scans, more.before, None, known)

@@ -40,7 +40,8 @@ def test_what_goes_through_a_run_in_steps_says_how_long_it_lasts(run, fails, com
 
 
 def test_formats_that_count_frames_say_how_long_the_run_lasts(run, capsys):
-    options = ["--image", "1280x720", "--format", "motchallenge", "--rate", "20"]
+    known = ["--image", "1280x720", "--set", "sensors.rgb.rate_hz=20"]
+    options = [*known, "--format", "motchallenge", "--rate", "20"]
     assert main(["track", str(run / "det.csv"), "--out", str(run / "mot"), *options]) == 2
     warning, error = capsys.readouterr().err.splitlines()
     assert "is a time of sensor 'rgb' wrong" in warning
