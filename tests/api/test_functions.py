@@ -97,9 +97,10 @@ def test_a_run_is_read_back(night, tmp_path):
 
 def test_filter_and_smoother_are_compared(night):
     detections, truth = night
-    comparison = jeat_graph.compare(detections, "default", truth, lags_s=(0.0, 0.3))
-    errors = {row["lag_s"]: row["position_rmse"] for row in comparison.values["lag_curve"]}
-    assert errors[0.3] < errors[0.0]
+    comparison = jeat_graph.compare(detections, "default", truth, lags_s=(0.0, 0.05, 0.3))
+    errors = {row["lag_s"]: row for row in comparison.values["lag_curve"]}
+    assert errors[0.05]["position_rmse"] < errors[0.0]["position_rmse"]
+    assert errors[0.3]["velocity_rmse"] < errors[0.05]["velocity_rmse"] < errors[0.0]["velocity_rmse"]
 
 
 def test_a_recording_calibrates_a_configuration(night):
@@ -110,7 +111,7 @@ def test_a_recording_calibrates_a_configuration(night):
 
 
 def test_one_override_may_stand_alone():
-    assert load_config("highway", "image.width=1920").image.width == 1920.0
+    assert load_config("default", "image.width=1920").image.width == 1920.0
 
 
 def test_the_size_of_the_picture_may_be_written_as_on_the_command_line():

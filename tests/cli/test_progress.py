@@ -87,7 +87,7 @@ def test_track_has_a_bar_for_the_smoothing_at_the_end(recording, tmp_path, monke
 
 @pytest.mark.parametrize("smoother", ["fixed-lag", "rts"])
 def test_a_tracker_tells_how_many_tracks_it_has_smoothed(smoother, recording):
-    tracker = Tracker(load_config("default", [f"smoother.engine={smoother}"]))
+    tracker = Tracker(load_config("paper", [f"smoother.engine={smoother}"]))
     for _ in tracker.run(read_detections(recording / "detections.csv")):
         pass
     shares: list[float] = []
