@@ -28,7 +28,8 @@ for line in sys.stdin.read().splitlines():
 """
 MANIFEST = "name,detections\na,{det}\nb,{det}\n"
 NO_PICTURES = ["detect", "train", "render", "frame", "draw", "view", "camera", "calibrate", "register"]
-SERVED_ELSEWHERE = {"demo"}  # simulates, tracks, judges and draws, as others do here
+#: `demo` simulates, tracks, judges and draws, as others do here; `serve` runs until it is ended.
+SERVED_ELSEWHERE = {"demo", "serve"}
 
 
 @pytest.fixture
@@ -64,6 +65,7 @@ def test_every_command_from_a_folder_of_strange_modules(trap, recording):
         ["report", "run", "--out", "run.html"],
         ["compare", "run", *truth, "--detections", detections],
         ["events", "info", "run/run.json"],
+        ["explain", "run", "--detections", detections, "--track", "1"],
         ["stream", "--help"],
         ["road", "run", "--camera", "none.yaml", "--out", "road"],
         ["detectors", "--no-speed"],
@@ -83,7 +85,7 @@ def test_every_command_from_a_folder_of_strange_modules(trap, recording):
     assert not mark.exists(), mark.read_text()
     said = [json.loads(line) for line in done.stdout.splitlines() if line.startswith('["')]
     expected = [0] * len(commands)
-    expected[9] = expected[11] = 2  # no events, no camera
+    expected[9] = expected[12] = 2  # no events, no camera
     assert said == [[command[0], code] for command, code in zip(commands, expected, strict=True)], done.stderr
 
 
