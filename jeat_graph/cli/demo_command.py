@@ -91,7 +91,7 @@ def _recording(args: argparse.Namespace) -> DemoRecording:
 
 def _show(args: argparse.Namespace, out: Path) -> None:
     """Track a recording and judge the tracks, and draw them."""
-    from jeat_graph.config.reading import load_config
+    from jeat_graph.config.reading import as_config, load_config
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.io.truth_io import write_truth
@@ -102,8 +102,10 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     from jeat_graph.runs.run_options import RunOptions, RunRecord
     from jeat_graph.runs.tracking_run import write_run
 
+    config = load_config(args.config)  # what is wrong in it is said before anything is simulated
     recording = _recording(args)
-    config = fit_input(load_config(args.config), recording.detections)[0]
+    config = as_config(config, (recording.width, recording.height))
+    config = fit_input(config, recording.detections)[0]
     directory = RunDirectory(out / "run")
     warnings = check_detections(recording.detections, config, recording.name)
     source = out / "detections.csv"

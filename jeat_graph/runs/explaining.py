@@ -130,7 +130,8 @@ def explain_place(
         config: of the recording.
         detections: as they were tracked.
         t: time (s).
-        x, y: the place (px).
+        x: the place (px),
+        y: and its other coordinate (px).
         within_s: how far from the time boxes and tracks may be (s).
 
     Raises:

@@ -6,7 +6,6 @@ import difflib
 
 import numpy as np
 
-from jeat_graph.config.reading import load_config, preset_names
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
@@ -58,7 +57,6 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
     if not unknown:
         return
     near = difflib.get_close_matches(unknown[0], config.sensor_names, 1)
-    fitting = [p for p in preset_names() if set(detections.sensors) <= load_config(p).sensors.keys()]
     settings = []
     for name in unknown:
         rate = scan_rate_hz([detections], name)
@@ -68,11 +66,10 @@ def _check_sensors(detections: Detections, config: Config, names: str) -> None:
         f"sensors {', '.join(map(repr, unknown))} are" if len(unknown) > 1 else f"sensor {unknown[0]!r} is"
     )
     raise UnknownSensorError(
-        f"{names}: {several} not declared (declared: {', '.join(config.sensor_names)})"
+        f"{names}: {several} not declared (declared: {', '.join(config.sensor_names) or 'none'})"
         + (f"; did you mean {near[0]!r}?" if near else ";")
-        + (f" use --config {fitting[0]}," if fitting else "")
         + f" declare with {' '.join(settings)} or in a file from `jeat-graph calibrate`,"
-        + " or rename it with NAME=path"
+        + " take any sensor with --set input.undeclared=declare, or rename it with NAME=path"
     )
 
 
@@ -124,8 +121,6 @@ def _check_picture(detections: Detections, config: Config, names: str) -> list[s
         f"up to {beyond:.0f} px beyond its edge (they reach from {low[0]:.0f}, {low[1]:.0f} to "
         f"{high[0]:.0f}, {high[1]:.0f})"
     )
-    if count == total:
-        found += ", so that little or nothing can be tracked"
     if count > MOST_OUTSIDE * total:
         found += "; if the picture has another size, give it: --image WIDTHxHEIGHT (in Python image=)"
     return [found]

@@ -8,10 +8,6 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
-from jeat_graph.tracking.sensor_state import SensorState
-
-#: A lag is spoken of from here on (s), and where it is so many of its standard deviations.
-_LEAST_S, _SURE = 0.02, 5.0
 
 
 def at_measurement(detections: Detections, config: Config) -> Detections:
@@ -39,17 +35,3 @@ def taken_off(detections: Detections, late_s: Mapping[str, float]) -> Detections
     earlier = t - np.array([of_row[name] for name in sensor.tolist()])
     named = None if detections.classes is None else classes
     return Detections.from_rows(earlier, sensor, boxes, scores, empty, named, detections.embedding_rows())
-
-
-def late_clocks(states: Mapping[str, SensorState]) -> list[str]:
-    """What is to be said of sensors whose boxes are older than their times, a line each.
-
-    Args:
-        states: what a tracker has learnt of its sensors, by name.
-    """
-    return [
-        f"sensor {name}: its boxes are {one.lag_s:.3f} s older than their times say, beside those of the "
-        f"others; `--set sensors.{name}.latency_s=...` takes that off, `calibrate` finds it more exactly"
-        for name, one in states.items()
-        if one.lag_std_s is not None and one.lag_s > max(_LEAST_S, _SURE * one.lag_std_s)
-    ]

@@ -15,12 +15,10 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, InputWarning
-from jeat_graph.data.progress import progress_to, refreshing
-from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.data.progress import refreshing
 from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory
-from jeat_graph.runs.latency import late_clocks
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.damage import refusing_damage
@@ -115,25 +113,12 @@ class RunSteps:
                 bar.update()
             bar.refresh()
             if self._smooths:
-                self._write("smoothed", self._finish())
+                self._write("smoothed", self._tracker.finish())
             if self._kept is not None:
                 self._write("measured", self._kept.release())
         taken = step_s[self._done :]
         self._sum_up(taken if len(taken) else np.zeros(1), time.perf_counter() - begin)
         return self._instants
-
-    def _finish(self) -> Trajectories:
-        """End the tracks, and show how many have been smoothed: for whole tracks that is most of the work."""
-        from tqdm import tqdm
-
-        form = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}]"
-        hidden = not self._options.progress
-        with (
-            tqdm(total=1.0, desc="smooth", bar_format=form, disable=hidden, leave=False) as bar,
-            refreshing(bar),
-            progress_to(lambda share: bar.update(share - bar.n)),
-        ):
-            return self._tracker.finish()
 
     def _after_step(self, k: int) -> None:
         """Write what else step `k` gave, and now and then what has become final, and the state."""
@@ -189,11 +174,7 @@ class RunSteps:
         record.timings["step_median_ms"] = round(1e3 * float(np.median(step_s)), 4)
         record.timings["step_p99_ms"] = round(1e3 * float(np.quantile(step_s, 0.99)), 4)
         record.counts |= {"tracks_born": self._tracker.num_born, "tracks_reported": len(self._reported)}
-        states = self._tracker.sensor_states()
-        record.learnt = {name: one._asdict() for name, one in states.items()}
-        for line in late_clocks(states):
-            record.warnings.append(line)
-            warnings.warn(line, InputWarning, stacklevel=2)
+        record.learnt = {name: one._asdict() for name, one in self._tracker.sensor_states().items()}
         record.counts["causal_rows"] = self._rows["causal"]
         detections = len(self._detections)
         if detections >= _MANY and self._rows["causal"] < _LEAST_TRACKED * detections:

@@ -75,7 +75,8 @@ def test_the_demo_tracks_the_recording_that_comes_along(alone, tmp_path, capsys)
     rows = [line.split("|")[1:4] for line in (tmp_path / "scores.md").read_text().splitlines()[2:]]
     mota = {name.strip(): float(value) for name, value, _ in rows}
     assert mota["evt + rgb"] > max(mota["evt alone"], mota["rgb alone"])
-    assert mota["evt + rgb, smoothed"] > 95.0
+    # Eight seconds at night: what the sensors are like is learnt in them, with a third of the tracks begun.
+    assert mota["evt + rgb, smoothed"] > mota["evt + rgb"] > 70.0
     assert (tmp_path / "tracks.png").read_bytes().startswith(b"\x89PNG")
     assert "night-nolight" in capsys.readouterr().err
 

@@ -72,10 +72,10 @@ def test_tracking_and_judging_take_objects_or_files(night, tmp_path):
     from jeat_graph.io.truth_io import write_truth
 
     detections, truth = night
-    tracks = track(detections, load_config("highway"))
+    tracks = track(detections, load_config("default"))
     write_detections(detections, tmp_path / "detections.csv")
     write_truth(truth, tmp_path / "gt.csv")
-    again = track(tmp_path / "detections.csv", "highway")
+    again = track(tmp_path / "detections.csv", "default")
     assert len(again.causal) == len(tracks.causal)
     scores = evaluate(tracks, truth)
     assert set(scores) == {"causal", "smoothed"}
@@ -97,20 +97,21 @@ def test_a_run_is_read_back(night, tmp_path):
 
 def test_filter_and_smoother_are_compared(night):
     detections, truth = night
-    comparison = jeat_graph.compare(detections, "highway", truth, lags_s=(0.0, 0.3))
-    errors = {row["lag_s"]: row["position_rmse"] for row in comparison.values["lag_curve"]}
-    assert errors[0.3] < errors[0.0]
+    comparison = jeat_graph.compare(detections, "default", truth, lags_s=(0.0, 0.05, 0.3))
+    errors = {row["lag_s"]: row for row in comparison.values["lag_curve"]}
+    assert errors[0.05]["position_rmse"] < errors[0.0]["position_rmse"]
+    assert errors[0.3]["velocity_rmse"] < errors[0.05]["velocity_rmse"] < errors[0.0]["velocity_rmse"]
 
 
 def test_a_recording_calibrates_a_configuration(night):
-    config = jeat_graph.calibrate(night[0], base="highway")
+    config = jeat_graph.calibrate(night[0], base="default")
     assert set(config.sensors) == {"rgb", "evt"}
     with pytest.raises(DataError, match="one for each"):
         jeat_graph.calibrate([night[0]], [night[1], night[1]])
 
 
 def test_one_override_may_stand_alone():
-    assert load_config("highway", "image.width=1920").image.width == 1920.0
+    assert load_config("default", "image.width=1920").image.width == 1920.0
 
 
 def test_the_size_of_the_picture_may_be_written_as_on_the_command_line():

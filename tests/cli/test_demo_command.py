@@ -60,7 +60,7 @@ def test_its_run_can_be_judged_by_eval(demo, capsys):
 
 def test_a_configuration_without_its_sensors_is_refused_before_anything_is_written(tmp_path, fails):
     config = tmp_path / "radar.yaml"
-    config.write_text("sensors: {radar: {rate_hz: 10}}\n")
+    config.write_text("input: {undeclared: refuse}\nsensors: {radar: {rate_hz: 10}}\n")
     message = fails("demo", "--config", config, "--out", tmp_path / "demo", *SHORT)
     assert "sensors 'evt', 'rgb' are not declared (declared: radar)" in message
     assert not (tmp_path / "demo").exists()

@@ -41,9 +41,11 @@ def test_raw_recordings_become_tracks_on_a_film(tmp_path, monkeypatch, capsys):
 
 def test_the_first_command_that_fails_ends_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(demo_raw, "SCENARIO", "nonsense")
-    words = ["demo", "--from-raw", "--duration", "1", "--out", str(tmp_path / "demo")]
-    assert main(words) == 2
+    out = tmp_path / "demo"
+    assert main(["demo", "--from-raw", "--duration", "1", "--out", str(out)]) == 2
     said = capsys.readouterr()
     assert "nonsense" in said.err
-    assert "jeat-graph track" not in said.err
+    assert said.err.count("demo: jeat-graph ") == 1
     assert "Next:" not in said.out
+    assert (out / "scores.md").exists(), "what came before it stays"
+    assert not (out / "raw").exists()

@@ -11,6 +11,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
+from jeat_graph.detection.declared import declared_of
 from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events.evt3_writer import Evt3Writer
 
@@ -172,14 +173,14 @@ def test_track_takes_a_networks_boxes_for_what_is_known_of_them(tmp_path, raw, m
     used = {}
     for name, more in {
         "plain": [],
-        "set": ["--set", "sensors.rgb.p_detect=0.7"],
-        "highway": ["--config", "highway"],
+        "set": ["--set", "sensors.rgb.even_score=0.7"],
+        "paper": ["--config", "paper"],
     }.items():
         assert main([*frames, "--out", str(tmp_path / name), *more]) == 0
         used[name] = json.loads((tmp_path / name / "run.json").read_text())["config"]["sensors"]["rgb"]
-        assert ("sehn-frames.tracking.yaml" in capsys.readouterr().err) == (name != "highway")
-    known = load_config("sehn").sensors["rgb"]
-    assert used["plain"]["p_detect"] == known.p_detect
-    assert used["set"]["p_detect"] == 0.7
-    assert used["set"]["rho_x"] == used["plain"]["rho_x"] == known.rho_x
-    assert used["highway"]["rho_x"] == load_config("highway").sensors["rgb"].rho_x
+        assert ("sehn-frames.tracking.yaml" in capsys.readouterr().err) == (name != "paper")
+    known = load_config("default", declared_of({"rgb": "sehn"})).sensors["rgb"]
+    assert used["plain"]["even_score"] == known.even_score is not None
+    assert used["set"]["even_score"] == 0.7
+    assert used["set"]["rate_hz"] == used["plain"]["rate_hz"]
+    assert used["paper"]["even_score"] is None

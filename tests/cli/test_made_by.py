@@ -27,13 +27,13 @@ def of_run(folder):
 
 def test_a_file_of_boxes_is_tracked_as_what_is_known_of_its_networks_says(boxes, tmp_path, capsys):
     out = str(tmp_path / "run")
-    assert main(["track", boxes, "--out", out, *BOTH, "--set", "sensors.evt.p_detect=0.6"]) == 0
+    assert main(["track", boxes, "--out", out, *BOTH, "--set", "sensors.evt.even_score=0.7"]) == 0
     assert "sehn-frames.tracking.yaml" in capsys.readouterr().err
-    found, preset = of_run(tmp_path / "run"), load_config("sehn")
-    assert found["sensors"]["rgb"]["p_detect"] == preset.sensors["rgb"].p_detect
-    assert found["sensors"]["evt"]["memory_s"] == preset.sensors["evt"].memory_s
-    assert found["sensors"]["evt"]["p_detect"] == 0.6, "what the user sets counts over it"
-    assert found["birth"]["max_overlap"] == preset.birth.max_overlap
+    found = of_run(tmp_path / "run")["sensors"]
+    known = load_config("default", declared_of({"rgb": "sehn", "evt": "sehn"})).sensors
+    assert found["rgb"]["even_score"] == known["rgb"].even_score is not None
+    assert found["evt"]["kind"] == known["evt"].kind == "event"
+    assert found["evt"]["even_score"] == 0.7, "what the user sets counts over it"
 
 
 def test_boxes_from_a_pipe_are_taken_for_what_the_same_settings_say(boxes, monkeypatch, capsys):
@@ -53,7 +53,7 @@ def test_boxes_from_a_pipe_are_taken_for_what_the_same_settings_say(boxes, monke
 @pytest.mark.parametrize("command", ["track", "stream"])
 def test_what_cannot_be_told_is_one_line(command, boxes, tmp_path, fails):
     begin = ["track", boxes, "--out", str(tmp_path / "run")] if command == "track" else ["stream"]
-    assert "sehn says it itself" in fails(*begin, *BOTH, "--config", "sehn")
+    assert "paper says it itself" in fails(*begin, *BOTH, "--config", "paper")
     assert "nonsense" in fails(*begin, "--detector-frames", "nonsense")
     bare = str(tmp_path / "bare.onnx")
     assert "--detector-frames: nothing beside the network" in fails(*begin, "--detector-frames", bare)

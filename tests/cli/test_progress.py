@@ -18,7 +18,6 @@ from jeat_graph.cli.detect_command import detect_with_bar
 from jeat_graph.cli.main import main
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import in_good_order
-from jeat_graph.config.reading import load_config
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.progress import progress_to, with_progress, write_line
 from jeat_graph.detection.detecting import detect_files
@@ -26,14 +25,12 @@ from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.summary import summarise
 from jeat_graph.drawing.page.document import render_page
 from jeat_graph.eval.compare import compare
-from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events.evt3_writer import Evt3Writer
 from jeat_graph.io.events.opening import open_events
 from jeat_graph.io.truth_io import read_truth
 from jeat_graph.io.video_writer import FrameWriter
 from jeat_graph.runs.measured import measured_run
 from jeat_graph.runs.recorded import load_run_data
-from jeat_graph.tracking.tracker import Tracker
 
 
 class Terminal(io.StringIO):
@@ -78,27 +75,6 @@ def test_the_percentage_moves_within_a_stage(monkeypatch):
     assert "100%" not in stream.getvalue().split("judging  75%")[0]
 
 
-def test_track_has_a_bar_for_the_smoothing_at_the_end(recording, tmp_path, monkeypatch):
-    stream = Terminal()
-    monkeypatch.setattr(sys, "stderr", stream)
-    assert main(["track", str(recording / "detections.csv"), "--out", str(tmp_path / "run")]) == 0
-    assert "smooth:   0%" in stream.getvalue()
-
-
-@pytest.mark.parametrize("smoother", ["fixed-lag", "rts"])
-def test_a_tracker_tells_how_many_tracks_it_has_smoothed(smoother, recording):
-    tracker = Tracker(load_config("highway", [f"smoother.engine={smoother}"]))
-    for _ in tracker.run(read_detections(recording / "detections.csv")):
-        pass
-    shares: list[float] = []
-    with progress_to(shares.append):
-        tracker.finish()
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
-    assert len(set(shares)) > 15  # of the tracks that live to the end, with `rts` of all
-    assert shares[1] < 0.1
-
-
 def moves(work: Callable[[], object]) -> list[float]:
     """What a piece of work tells of its progress."""
     shares: list[float] = []
@@ -111,7 +87,7 @@ def moves(work: Callable[[], object]) -> list[float]:
 def test_judging_and_comparing_tell_how_far_they_are(recording, small_plots, tmp_path):
     run = tmp_path / "run"
     truth = str(recording / "gt.csv")
-    assert main(["track", str(recording / "detections.csv"), "--out", str(run), "--config", "highway"]) == 0
+    assert main(["track", str(recording / "detections.csv"), "--out", str(run)]) == 0
     assert len(moves(lambda: load_run_data(run, truth))) >= 8
     assert len(moves(lambda: render_page(load_run_data(run)))) > 10  # as many as there are tracks
     measured = measured_run(run)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from jeat_graph.cli.main import main
+from jeat_graph.io.trajectories_io import read_trajectories
 
 HEADER = "t,sensor,left,top,width,height,score\n"
 
@@ -40,7 +42,8 @@ def test_what_goes_through_a_run_in_steps_says_how_long_it_lasts(run, fails, com
 
 
 def test_formats_that_count_frames_say_how_long_the_run_lasts(run, capsys):
-    options = ["--image", "1280x720", "--format", "motchallenge", "--rate", "20"]
+    known = ["--image", "1280x720", "--set", "sensors.rgb.rate_hz=20"]
+    options = [*known, "--format", "motchallenge", "--rate", "20"]
     assert main(["track", str(run / "det.csv"), "--out", str(run / "mot"), *options]) == 2
     warning, error = capsys.readouterr().err.splitlines()
     assert "is a time of sensor 'rgb' wrong" in warning
@@ -48,11 +51,15 @@ def test_formats_that_count_frames_say_how_long_the_run_lasts(run, capsys):
 
 
 @pytest.mark.parametrize("engine", ["full", "rts"])
-def test_engines_over_whole_tracks_name_the_track(tmp_path, capsys, engine):
+def test_engines_over_whole_tracks_have_a_row_at_each_scan_and_none_between(tmp_path, engine):
+    """However long nothing comes: a track ends there, and is not carried on to the wrong time."""
     path = detections(tmp_path, 1e18)
     options = ["--image", "1280x720", "--smoother", engine]
-    assert main(["track", str(path), "--out", str(tmp_path / "run"), *options]) == 2
-    assert "a track lasts from" in capsys.readouterr().err.splitlines()[-1]
+    assert main(["track", str(path), "--out", str(tmp_path / "run"), *options]) == 0
+    table = read_trajectories(tmp_path / "run" / "smoothed.csv")
+    assert len(table) <= 80
+    lasting = [np.ptp(table.t[table.track_id == one]) for one in np.unique(table.track_id)]
+    assert max(lasting) < 2.0
 
 
 def test_a_rate_that_no_film_has_is_refused(tmp_path, capsys):

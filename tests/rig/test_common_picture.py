@@ -15,6 +15,7 @@ import yaml
 
 from jeat_graph import Detections, Tracker, load_config, track
 from jeat_graph.cli.main import main
+from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.rig.common_picture import in_common
 from jeat_graph.runs.measured import measured_run
@@ -62,7 +63,7 @@ def test_a_recording_is_brought_to_one_picture_and_one_clock(rig: Path) -> None:
     np.testing.assert_allclose(found.scan_t[order], right.scan_t, atol=1e-7)
     np.testing.assert_allclose(found.boxes[order], right.boxes, atol=1e-9)
     assert config.sensors["evt"].image is None
-    assert config.sensors["evt"].sigma_px == pytest.approx(1.5 * np.sqrt(2.0 * 1.5))
+    assert config.sensors["evt"].sigma_px == pytest.approx(SensorConfig().sigma_px * np.sqrt(2.0 * 1.5))
     assert "0.25 s are taken off its times, drift 100 ppm" in said[0]
 
 
@@ -89,8 +90,7 @@ def test_a_run_is_tracked_again_as_it_was(rig: Path, tmp_path: Path) -> None:
     rig.unlink()
     (tracks,) = measured_run(out).tracks
     table = pd.read_csv(out / "smoothed.csv")
-    at = np.interp(tracks.data.t[tracks.data.key], table.t, table.x)
-    assert np.abs(tracks.data.z[:, 0] - at).max() < 3.0
+    assert np.abs(tracks.mean[:, 0, 0] - np.interp(tracks.t, table.t, table.x)).max() < 3.0
     assert set(tracks.sensor) == {0, 1}
 
 

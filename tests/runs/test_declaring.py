@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from jeat_graph import track
 from jeat_graph.calibration.procedure import calibrate_without_truth
 from jeat_graph.config.reading import as_config, config_to_dict, load_config
 from jeat_graph.config.schema import SensorConfig
@@ -114,19 +115,6 @@ def test_two_scans_tell_no_rate():
     assert assumed == 20.0
 
 
-def test_scans_that_come_seldom_are_said_to_bound_what_can_be_followed():
-    seldom = camera(0.0, scans=30, rate=1.0)
-    config, notes = fit_input(load_config("default"), seldom)
-    assert config.motion.velocity_std_per_size < 2.0
-    assert any("1 Hz" in note and "length" in note for note in notes)
-    as_set, notes = fit_input(load_config("default", ["input.slow_scans=as_set"]), seldom)
-    assert as_set.motion == load_config("default").motion
-    assert not any("length" in note for note in notes)
-    usual, notes = fit_input(load_config("default"), camera(0.0, scans=30, rate=10.0))
-    assert usual.motion == load_config("default").motion
-    assert not any("length" in note for note in notes)
-
-
 def test_a_sensor_declared_by_its_rate_alone_is_as_an_undeclared_one():
     seen = camera(0.0, name="gantry")
     declared = load_config("default", ["sensors.gantry={rate_hz: 20}"])
@@ -134,9 +122,14 @@ def test_a_sensor_declared_by_its_rate_alone_is_as_an_undeclared_one():
 
 
 def test_what_a_declared_sensor_says_itself_counts():
-    sensor = load_config("default", ["sensors.gantry={rate_hz: 20, sigma_px: 4}"]).sensors["gantry"]
-    assumed = load_config("default").input.undeclared_sensor()
-    assert sensor == replace(assumed, rate_hz=20.0, sigma_px=4.0)
+    said = load_config("default", ["sensors.gantry={rate_hz: 20, even_score: 0.4, kind: event}"])
+    sensor = fit_input(said, camera(0.0, name="gantry"))[0].sensors["gantry"]
+    assert sensor == SensorConfig(rate_hz=20.0, even_score=0.4, kind="event")
+
+
+def test_who_refuses_sensors_that_are_not_declared_gets_none_and_keeps_the_rates():
+    strict = load_config("default", ["sensors.radar.rate_hz=10", "input.undeclared=refuse"])
+    assert fit_input(strict, camera(0.0), camera(0.0, name="radar"))[0].sensors == strict.sensors
 
 
 def test_a_preset_that_declares_no_sensors_by_itself_assumes_nothing_of_them():
@@ -144,13 +137,20 @@ def test_a_preset_that_declares_no_sensors_by_itself_assumes_nothing_of_them():
     assert sensor == SensorConfig(rate_hz=20.0)
 
 
-@pytest.mark.parametrize(("beyond", "clip"), [(0, True), (1, True), (4, False)])
-def test_tracks_are_clipped_unless_the_boxes_themselves_reach_beyond_the_picture(beyond, clip):
-    boxes = np.tile([500.0, 300.0, 60.0, 40.0], (200, 1))
-    boxes[:beyond, 0] = -30.0
-    config, notes = fit_input(as_config("default", (1280, 720)), recording(boxes))
-    assert config.output.clip is clip
-    assert any("beyond the picture" in note for note in notes) is not clip
-    highway = load_config("highway").sensors["rgb"]
-    known = replace(as_config("highway", (1280, 720)), sensors={"cam": highway})
-    assert fit_input(known, recording(boxes))[0].output.clip
+def across(end):
+    """A vehicle that leaves a picture 640 px wide on the right; its boxes end there, or go on behind it."""
+    left = 400.0 + 8.0 * np.arange(40)
+    full = np.minimum(left + 100.0, end)
+    boxes = np.column_stack([left, np.full(40, 200.0), full - left, np.full(40, 60.0)])[left < 640.0]
+    n = len(boxes)
+    return Detections.from_rows(np.arange(n) / 20.0, np.full(n, "cam"), boxes, np.full(n, 0.9))
+
+
+@pytest.mark.parametrize(("end", "clip"), [(640.0, True), (1e3, False)])
+@pytest.mark.parametrize("wanted", [True, False])
+def test_boxes_end_at_the_edge_where_the_detectors_boxes_do(end, clip, wanted):
+    """`output.clip` asks for that; boxes that reach beyond the picture are left as they are."""
+    tracks = track(across(end), load_config("default", [f"output.clip={wanted}"]), image=(640, 480))
+    reach = tracks.causal.boxes[:, 0] + tracks.causal.boxes[:, 2]
+    assert (reach.max() <= 640.0) == (clip and wanted)
+    assert reach.max() > 639.0

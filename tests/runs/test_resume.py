@@ -17,7 +17,7 @@ from jeat_graph.io.detections_io import read_detections
 from jeat_graph.runs import run_steps
 from jeat_graph.tracking.tracker import Tracker
 
-OPTIONS = ["--diagnostics", "--format", "parquet", "--set", "smoother.lag_s=0.3", "--set", "smoother.chunk=8"]
+OPTIONS = ["--diagnostics", "--format", "parquet", "--set", "smoother.lag_s=0.3"]
 
 
 class BrokenOffError(Exception):
@@ -105,7 +105,7 @@ def _counted(batches, into):
 def test_what_was_left_by_another_run_is_refused_with_a_sentence(recording, tmp_path, monkeypatch, capsys):
     out = tmp_path / "out"
     broken_off(monkeypatch, recording, out, 60)
-    assert track(recording, out, "--resume", "--set", "birth.initial=3") == 2
+    assert track(recording, out, "--resume", "--set", "output.clip=false") == 2
     assert "was left by a run with other settings" in capsys.readouterr().err
     (out / ".resume" / "state.npz").write_bytes(b"damaged")
     assert track(recording, out, "--resume") == 2
@@ -121,9 +121,9 @@ def test_rows_that_are_missing_are_noticed(recording, tmp_path, monkeypatch, cap
     assert "shorter than when the state was saved" in capsys.readouterr().err
 
 
-def test_a_state_in_another_process_cannot_be_gone_on_with(recording, tmp_path, capsys):
-    assert track(recording, tmp_path / "out", "--resume", "--set", "smoother.worker=true") == 2
-    assert "does not go with smoother.worker" in capsys.readouterr().err
+def test_a_tracker_that_is_not_saved_cannot_be_gone_on_with(recording, tmp_path, capsys):
+    assert track(recording, tmp_path / "out", "--resume", "--set", "tracker.engine=reference") == 2
+    assert "--resume does not go with tracker.engine=reference" in capsys.readouterr().err
 
 
 def test_killed_at_random_moments_it_goes_on(tmp_path, full):
