@@ -26,6 +26,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "generated_reference",
     "mathml",
+    "type_names",
 ]
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
@@ -35,6 +36,9 @@ autodoc_member_order = "bysource"
 autodoc_mock_imports = ["torch"]
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented_params"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+python_maximum_signature_line_length = 88
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
@@ -48,4 +52,18 @@ html_css_files = ["extra.css"]
 html_search_scorer = str(Path(__file__).parent / "_static" / "scorer.js")
 html_copy_source = False
 html_show_sphinx = False
-autodoc_type_aliases = {name: name for name in ("FloatArray", "IntArray", "BoolArray", "TextArray")}
+# Shown by their names, not as the unions that they stand for.
+_NAMED = (
+    "FloatArray",
+    "IntArray",
+    "BoolArray",
+    "TextArray",
+    "RecordArray",
+    "EmbeddingArray",
+    "PathLike",
+    "ScanLike",
+)
+autodoc_type_aliases = {name: name for name in _NAMED} | {
+    "npt.ArrayLike": "ArrayLike",
+    "ArrayLike": "ArrayLike",
+}

@@ -69,7 +69,8 @@ class ModelConstants:
         correlation_time_s: hits, and misses, closer together are one witness (s). Measured on real detectors.
         first_period_s: period of a sensor of which there was one scan (s).
         p_detect, p_detect_strength: mean and strength of the Beta prior of one object's P_D. Prior.
-        p_detect_bounds: of the sensor's learnt mean.
+        p_detect_bounds: of the sensor's learnt mean. Were it less, what clutter gives a track by chance would
+            pass for an object that is seldom seen.
         track_p_detect_bounds: of a track's own mean, in association.
         track_p_detect_memory_s: memory of a track's own hits and misses (s).
         p_detect_count: objects that the prior of the sensor's mean counts for.
@@ -182,7 +183,7 @@ class ModelConstants:
     first_period_s: float = 0.05
     p_detect: float = 0.7
     p_detect_strength: float = 3.0
-    p_detect_bounds: tuple[float, float] = (0.05, 0.98)
+    p_detect_bounds: tuple[float, float] = (0.2, 0.98)
     track_p_detect_bounds: tuple[float, float] = (0.02, 0.98)
     track_p_detect_memory_s: float = 1.5
     p_detect_count: float = 6.0

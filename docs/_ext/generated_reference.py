@@ -13,20 +13,21 @@ from sphinx.application import Sphinx
 _WIDTH = 96
 #: Columns of the page of settings.
 _PRESETS = ("default", "paper")
-#: The sensor whose values stand for all.
+#: The sensor whose values stand for all; one that no preset declares has the defaults.
 _SENSOR = "rgb"
 #: Bounds above that keep numbers finite and mean nothing else.
 _NO_BOUND = 1e9
 _ABOUT_SETTINGS = """# Configuration
 
-Every setting, made from the schema in `jeat_graph/config`, with its values in two presets. `jeat-graph`
-takes the preset `default` if it is told nothing else. A setting is written `section.name=value` with `--set`,
-or as a tree in a YAML file for `--config`; `base: NAME` there takes the rest from a preset.
+Every setting, made from the schema in `jeat_graph/config`, with its value in the two presets. A command
+takes the preset `default` unless `--config` names another one. Write a setting as `section.name=value` with
+`--set`, or as a tree in a YAML file for `--config`; `base: NAME` in that file takes all other settings from
+a preset.
 
-Where the values come from: those of `default` were chosen over
-[real and simulated recordings](../guides/real-detectors.md); those of `paper` stand in the paper, or are
-marked as ours in its file where the paper leaves them open; `highway` and `kitti` were calibrated on the
-simulator and on KITTI. The [method](../method.md) has the equations.
+`default` declares no sensors: any name works, and the tracker learns what it needs about a sensor while it
+runs. The constants of its model are not settings; they stand in `filters/model_constants.py`, each with its
+unit. `paper` is the published method; its file marks which values the paper leaves open. The
+[method](../method.md) has the equations.
 """
 
 
@@ -86,8 +87,9 @@ def configuration_page() -> str:
         values = [getattr(preset, f.name) for preset in presets]
         title, note = f.name, ""
         if section is not kind:
-            title, note = f"{f.name}.NAME", f" The values are those of the sensor `{_SENSOR}`."
-            values = [value[_SENSOR] for value in values]
+            title = f"{f.name}.NAME"
+            note = f" Sensors that nobody declares have the values of `default`; `paper` has `{_SENSOR}`."
+            values = [value.get(_SENSOR, section()) for value in values]
         about = _about(section)
         head = f"| setting | meaning | {' | '.join(f'`{name}`' for name in _PRESETS)} | unit | range |"
         out.append(f"## {title}\n\n{about}{note}\n\n{head}\n|---|---|{'---|' * len(_PRESETS)}---|---|")

@@ -6,12 +6,12 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Literal, Unpack
 
 from jeat_graph.api.beside import FUNCTION_GROUP, find
 from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, as_names, recording_of, tables_of, truth_of
 from jeat_graph.config.reading import as_config
-from jeat_graph.config.schema import Config
+from jeat_graph.config.schema import Config, Preset
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, InputWarning
 from jeat_graph.data.tables.reading import ReadingOptions, TableOptions
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 def track(
     detections: Detections | pd.DataFrame | PathLike,
-    config: Config | PathLike = "default",
+    config: Config | Preset | PathLike = "default",
     *,
     image: tuple[float, float] | None = None,
     classes: Sequence[str] | None = None,
@@ -36,7 +36,7 @@ def track(
     Args:
         detections: the recording, a data frame that `Detections.from_pandas` takes, or a file that
             `read_detections` knows.
-        config: a configuration, the name of a preset, or a YAML file.
+        config: a configuration, the name of a preset (`default`, `paper`), or a YAML file.
         image: width and height of the picture (px), if not those of the configuration or of a file beside the
             recording (`seqinfo.ini`).
         classes: the detections to take, and those without a class; None takes all.
@@ -87,9 +87,9 @@ def evaluate(
     tracks: Trajectories | Tracks | Run | pd.DataFrame | PathLike,
     truth: GroundTruth | pd.DataFrame | PathLike,
     *,
-    kind: str = "causal",
+    kind: Literal["causal", "smoothed"] = "causal",
     classes: Sequence[str] | None = None,
-    outside: str = "false",
+    outside: Literal["false", "ignored"] = "false",
     **options: Unpack[ReadingOptions],
 ) -> dict[str, dict[str, float | int]]:
     """Judge tracks against truth.
@@ -147,7 +147,7 @@ def _of_each(tracks: object, options: ReadingOptions) -> tuple[ReadingOptions, R
 
 def compare(
     detections: Detections | pd.DataFrame | PathLike,
-    config: Config | PathLike = "default",
+    config: Config | Preset | PathLike = "default",
     truth: GroundTruth | pd.DataFrame | PathLike | None = None,
     *,
     lags_s: Sequence[float] | None = None,
@@ -158,7 +158,7 @@ def compare(
 
     Args:
         detections: as for `track`.
-        config: a configuration, the name of a preset, or a YAML file.
+        config: a configuration, the name of a preset (`default`, `paper`), or a YAML file.
         truth: truth, a data frame or its file. Without motion in it positions alone are judged, by the
             centres of its boxes; without truth only consistency.
         lags_s: lags (s); 0 is the filter.
@@ -191,7 +191,7 @@ def compare(
 def calibrate(
     detections: Detections | PathLike | Sequence[Detections | PathLike],
     truth: GroundTruth | PathLike | Sequence[GroundTruth | PathLike] | None = None,
-    base: Config | PathLike = "default",
+    base: Config | Preset | PathLike = "default",
     *,
     image: tuple[float, float] | None = None,
     tuned: bool = True,
@@ -201,12 +201,11 @@ def calibrate(
 
     Args:
         detections: one recording or several, or their files.
-        truth: the truth of each; without it only sensors, their rates and their clocks are found and, of
-            several sensors, what tracking taught of them (`sensors.NAME.learnt`).
+        truth: the truth of each; without it only sensors, their rates and their clocks are found.
         base: where all that is not estimated comes from.
         image: width and height of the picture (px), if not those of `base` or of a file beside.
-        tuned: with truth, also choose by tracking the recordings what matched detections cannot tell; takes
-            minutes where all else takes seconds.
+        tuned: with truth, keep the `even_score` of a sensor only where the tracks of the recordings are at
+            least as good with it.
         options: how data frames and files are read, as for `track`.
 
     Returns:

@@ -20,8 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "run_directory",
         metavar="RUN",
-        help="directory of a run; without its measurements.parquet (see track --diagnostics) it is tracked "
-        "again from its inputs, which must not have changed",
+        help="directory of a run; it is tracked again from its inputs, which must not have changed",
     )
     parser.add_argument(
         "--gt",

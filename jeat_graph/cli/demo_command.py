@@ -35,7 +35,7 @@ SEED = 7
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
-    add_config(parser, "highway", settings=False)
+    add_config(parser, settings=False)
     simulated = parser.add_argument_group("beyond the recording that comes along (needs jeat-graph-sehn)")
     add = simulated.add_argument
     add("--scenario", metavar="NAME", help=f"a scenario of `simulate` (default {SCENARIO})")
@@ -95,14 +95,15 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     from jeat_graph.io.detections_io import write_detections
     from jeat_graph.io.trajectories_io import read_trajectories
     from jeat_graph.io.truth_io import write_truth
+    from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections
     from jeat_graph.runs.inputs import describe_inputs
     from jeat_graph.runs.run_options import RunOptions, RunRecord
     from jeat_graph.runs.tracking_run import write_run
 
-    config = load_config(args.config)
     recording = _recording(args)
+    config = fit_input(load_config(args.config), recording.detections)[0]
     directory = RunDirectory(out / "run")
     warnings = check_detections(recording.detections, config, recording.name)
     source = out / "detections.csv"

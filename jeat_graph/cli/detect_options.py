@@ -144,7 +144,7 @@ def add_made_by(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--detector-{name}",
             metavar="NAME|FILE.onnx",
-            help=f"the network that makes the boxes of {sensor}; `default` is told what is known of them",
+            help=f"the network that makes the boxes of {sensor}; the tracker takes the file beside it",
         )
 
 

@@ -51,7 +51,7 @@ def add_config(parser: argparse.ArgumentParser, default: str = "default", *, set
     add = parser.add_argument
     add("--config", default=default, metavar="NAME|FILE", help=f"preset or YAML file (default: {default})")
     if settings:
-        add_settings(parser, "lifecycle.confirm_existence=0.9")
+        add_settings(parser, "smoother.lag_s=0.5")
 
 
 def add_settings(parser: argparse.ArgumentParser, example: str) -> None:
@@ -244,8 +244,9 @@ def add_smoother(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--smoother",
         choices=ENGINES,
-        help="engine of smoothed.csv: fixed-lag (live, with a delay), full (whole tracks, fragments "
-        "stitched), rts (the same, fast), fixed-lag-rts, none; default: as the configuration says",
+        help="smoother of smoothed.csv: rts (whole tracks), fixed-lag-rts (with a delay, for live use), full "
+        "and fixed-lag (the same; with the engine `paper` a factor graph in GTSAM), none; default: as the "
+        "configuration says",
     )
 
 
@@ -265,8 +266,8 @@ def add_formats(parser: argparse.ArgumentParser) -> None:
     add(
         "--diagnostics",
         action="store_true",
-        help="also write diagnostics.csv (NIS and noise scale of every update) and measurements.parquet (all "
-        "that tracks took in), for `report` and `compare`",
+        help="also write diagnostics.csv (NIS and noise scale of every update) and measurements.parquet (the "
+        "detections that tracks took), for `report` and `road`",
     )
 
 

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--no-compare",
         action="store_true",
-        help="leave out filter against smoother: a run without measurements.parquet is tracked again for it",
+        help="leave out filter against smoother, for which the run is tracked again",
     )
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.config.rig_file import read_rig
-from jeat_graph.config.schema import Config, InputConfig, SensorConfig
+from jeat_graph.config.schema import Config, InputConfig, Preset, SensorConfig
 from jeat_graph.config.section_tree import (
     build,
     check_keys,
@@ -34,7 +34,9 @@ def preset_names() -> list[str]:
 
 
 def load_config(
-    name_or_path: str | Path = "default", overrides: Iterable[str] = (), rig: str | Path | None = None
+    name_or_path: Preset | str | Path = "default",
+    overrides: Iterable[str] = (),
+    rig: str | Path | None = None,
 ) -> Config:
     """Load a preset by name, or a YAML file by path, lay a rig over it, and apply `key=value` overrides.
 
@@ -59,7 +61,7 @@ def load_config(
     return config_from_dict(tree)
 
 
-def as_config(config: Config | str | Path, image: tuple[float, float] | str | None = None) -> Config:
+def as_config(config: Config | Preset | str | Path, image: tuple[float, float] | str | None = None) -> Config:
     """Return a configuration, loaded if it is named, with another size of the picture if one is given.
 
     Args:

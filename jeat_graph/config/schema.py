@@ -8,6 +8,7 @@ of its section. `config.reading` reads the tree from YAML. Constants of the mode
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from jeat_graph.config.image import ImageConfig
 from jeat_graph.config.live import LiveConfig
@@ -29,6 +30,8 @@ __all__ = [
     "SmootherConfig",
     "TrackerConfig",
 ]
+#: Names of the presets, for types.
+Preset = Literal["default", "paper"]
 #: Most sensors: which of them saw a track is kept in the bits of a signed 64-bit number.
 MOST_SENSORS = 63
 

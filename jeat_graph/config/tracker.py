@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from jeat_graph.config.fields import Section, choice
 
+#: What computes the tracks, for types.
+Engine = Literal["core", "reference", "paper"]
 ENGINES = ("core", "reference", "paper")
 
 

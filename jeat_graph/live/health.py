@@ -17,7 +17,7 @@ from jeat_graph.tracking.sensor_state import SensorState
 
 SILENT, BACK, RUBBISH, WELL = "silent", "back", "rubbish", "well"
 #: So many times its usual clutter, or noise variance, is rubbish; half of it is well again.
-CLUTTER_FACTOR, NOISE_FACTOR, AGAIN = 10.0, 4.0, 0.5
+CLUTTER_FACTOR, NOISE_FACTOR, AGAIN = 5.0, 4.0, 0.5
 #: So is a sensor whose finds are real with no more than this probability; twice that is well again.
 LEAST_REAL = 0.05
 #: Fewer false boxes a scan than this are never many.
@@ -140,7 +140,7 @@ class SensorHealth:
             elif worst < AGAIN and name in self.rubbish:
                 self.rubbish.remove(name)
                 events.append(HealthChange(now, name, WELL, f"sensor {name!r} is as good as usual again"))
-            if name not in self.rubbish:
+            if worst < AGAIN:
                 usual[0] += _FOLLOWS * (state.clutter - usual[0])
                 usual[1] += _FOLLOWS * (state.noise_scale - usual[1])
         return events

@@ -22,7 +22,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Arrival, Taken, looked_last
 from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.repetition import Repetition
-from jeat_graph.live.rewinding import Rewinding, TakenStep
+from jeat_graph.live.rewinding import Rewinding, ReplayableStep
 from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
@@ -96,7 +96,7 @@ class LiveTracker:
         return self.tracker.time
 
     @property
-    def steps(self) -> list[TakenStep]:
+    def steps(self) -> list[ReplayableStep]:
         """The steps that may still be taken again, by time."""
         return self._rewinding.steps
 

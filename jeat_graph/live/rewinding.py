@@ -19,7 +19,7 @@ from jeat_graph.tracking.tracker import Tracker
 
 
 @dataclass
-class TakenStep:
+class ReplayableStep:
     """A step that may still be taken again, of M detections.
 
     Attributes:
@@ -43,7 +43,7 @@ class Mark(NamedTuple):
     """What `Rewinding.go_back` takes."""
 
     now: ModelSnapshot
-    steps: list[TakenStep]
+    steps: list[ReplayableStep]
     replayed: int
     identities: dict[str, Any]
 
@@ -63,7 +63,7 @@ class Rewinding:
 
     def __init__(self, tracker: Tracker) -> None:
         self._tracker = tracker
-        self.steps: list[TakenStep] = []
+        self.steps: list[ReplayableStep] = []
         self.replayed = 0
         self.settled = -math.inf
         self.identities = Identities(*tracker.living())
@@ -91,7 +91,7 @@ class Rewinding:
         before = later[0].before if later else now
         if later:
             tracker.restore(before)
-        step = TakenStep(t, _by_sensor(scans), before, tracker.living(), None, _nobody(scans))
+        step = ReplayableStep(t, _by_sensor(scans), before, tracker.living(), None, _nobody(scans))
         if later and later[0].t == t:
             step = _joined(self.steps.pop(k), step)
         self.steps.insert(k, step)
@@ -152,7 +152,7 @@ class Rewinding:
         for scans, known in zip(state["steps"], state["known"], strict=True):
             before, living = self._tracker.snapshot(), self._tracker.living()
             taken = self._tracker.take_in(scans)
-            self.steps.append(TakenStep(scans[0].t, scans, before, living, taken, known))
+            self.steps.append(ReplayableStep(scans[0].t, scans, before, living, taken, known))
         self.identities = Identities.from_state(state["identities"])
 
 
@@ -165,9 +165,9 @@ def _nobody(scans: list[Scan]) -> IntArray:
     return np.zeros(sum(len(scan) for scan in scans), dtype=np.int64)
 
 
-def _joined(old: TakenStep, more: TakenStep) -> TakenStep:
+def _joined(old: ReplayableStep, more: ReplayableStep) -> ReplayableStep:
     """A step of the scans of two, of other sensors at one time; what is known of detections stays."""
     scans = _by_sensor(old.scans + more.scans)
     known = _nobody(scans)
     known[np.repeat([scan in old.scans for scan in scans], [len(scan) for scan in scans])] = old.known
-    return TakenStep(old.t, scans, more.before, more.living, None, known)
+    return ReplayableStep(old.t, scans, more.before, more.living, None, known)

@@ -95,7 +95,6 @@ class _ReplayedStep(NamedTuple):
     batch: list[Scan]
     takers: list[IntArray]
     found: Hypotheses
-    sensors: tuple[str, ...]
 
 
 def explain_track(config: Config, detections: Detections, track_id: int) -> list[TrackMoment]:
@@ -176,13 +175,13 @@ def _steps(config: Config, detections: Detections) -> Iterator[_ReplayedStep]:
         tracker.step(batch)
         ends = np.cumsum([len(scan) for scan in batch])[:-1]
         takers = np.split(tracker.takers(sum(map(len, batch))), ends)
-        yield _ReplayedStep(batch[0].t, list(batch), takers, tracker.hypotheses(), tracker.sensor_names)
+        yield _ReplayedStep(batch[0].t, list(batch), takers, tracker.hypotheses())
 
 
 def _moment(step: _ReplayedStep, row: int) -> TrackMoment:
     found, terms = step.found, step.found.terms
     named = {}
-    for k, name in enumerate(step.sensors):
+    for k, name in enumerate(found.sensors):
         named[f"{name}: looks"] = float(terms.looks[row, k])
         named[f"{name}: scores"] = float(terms.scores[row, k])
     named["motion"] = float(terms.motion[row])
@@ -193,7 +192,7 @@ def _moment(step: _ReplayedStep, row: int) -> TrackMoment:
         t=step.t,
         log_odds=float(found.log_odds[row]),
         terms=named,
-        other="noise" if other < 0 else f"a false object of {step.sensors[other]!r}",
+        other="noise" if other < 0 else f"a false object of {found.sensors[other]!r}",
         reported=bool(found.reported[row]),
         visible=float(found.visible[row]),
         unseen_s=float(found.unseen_s[row]),

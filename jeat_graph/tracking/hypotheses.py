@@ -20,6 +20,7 @@ class Hypotheses(NamedTuple):
     """The living tracks of one step, those too that are not reported.
 
     Attributes:
+        sensors: names of the S sensors, in the order of the columns of `terms`.
         track_id: (N,) identities.
         boxes: (N, 4) left, top, width, height (px).
         log_odds: (N,) of being real, as the tracker has it.
@@ -30,6 +31,7 @@ class Hypotheses(NamedTuple):
         reported: (N,) whether the tables have it.
     """
 
+    sensors: tuple[str, ...]
     track_id: IntArray
     boxes: FloatArray
     log_odds: FloatArray
@@ -46,6 +48,7 @@ def hypotheses_of(
     constants: ModelConstants,
     t: float,
     shown: IntArray,
+    sensors: tuple[str, ...],
 ) -> Hypotheses:
     """Collect what is believed of tracks.
 
@@ -55,12 +58,12 @@ def hypotheses_of(
         constants: of the model.
         t: time of the last step (s).
         shown: (R,) identities of the tracks that are reported.
+        sensors: names of the sensors as the model counts them.
     """
-    sensors = len(learnt["p_detect"])
     evidence = Evidence(
         **{
             f.name: np.asarray(columns[f.name]).reshape(
-                (-1, sensors) if f.name in Evidence.PER_SENSOR else -1
+                (-1, len(sensors)) if f.name in Evidence.PER_SENSOR else -1
             )
             for f in fields(Evidence)
         }
@@ -70,6 +73,7 @@ def hypotheses_of(
     mean = np.asarray(columns["mean"]).reshape(len(track_id), 2, singer.STATES)
     sides = box_sides.corners(mean)
     return Hypotheses(
+        sensors=sensors,
         track_id=track_id,
         boxes=np.concatenate([sides[:, :2], singer.box_size(mean)], axis=1),
         log_odds=np.asarray(columns["log_odds"]).reshape(-1),

@@ -147,7 +147,15 @@ class ModelTracker(Updates, SavedModel):
         return {}
 
     def step(self, scans: ScanLike | Sequence[ScanLike]) -> Trajectories:
-        """Take in one scan, or several of one and the same time; see `Tracker.step`.
+        """Take in one scan, or several of one and the same time.
+
+        Args:
+            scans: a `Scan`, or a tuple of time (s), name of the sensor, boxes (M, 4) left, top, width, height
+                (px) and scores (M,), perhaps with classes (M,); or a list of these. No boxes (M = 0) say that
+                the sensor looked and found nothing.
+
+        Returns:
+            The reported tracks at that time.
 
         Raises:
             DataError: boxes, scores or embeddings that are not valid, or too many sensors.
@@ -288,7 +296,10 @@ class ModelTracker(Updates, SavedModel):
         return self._causal
 
     def predict(self, t: float) -> Prediction:
-        """Say where the tracks that are reported now will be at a time; see `Tracker.predict`.
+        """Say where the tracks that are reported now will be at a time; nothing changes.
+
+        Args:
+            t: time (s), not before that of the last step.
 
         Raises:
             DataError: a time that is not finite.
@@ -368,7 +379,7 @@ class ModelTracker(Updates, SavedModel):
         """Return what the living tracks are taken for, and why (`jeat-graph explain`)."""
         learnt, columns = self._model.learnt(), self._model.tracks()
         t = 0.0 if self.time is None else self.time
-        return hypotheses_of(columns, learnt, self.constants, t, self.causal().track_id)
+        return hypotheses_of(columns, learnt, self.constants, t, self.causal().track_id, self._looked)
 
     def sensor_states(self) -> dict[str, SensorState]:
         """Return what has been learnt of each sensor that has looked, by name; lags are not told."""
@@ -378,7 +389,7 @@ class ModelTracker(Updates, SavedModel):
         offsets = learnt["offsets"].tolist()
         return {
             name: SensorState(
-                clutter=float(learnt["leftovers"][k]),
+                clutter=float(learnt["false_boxes"][k]),
                 p_detect=float(learnt["p_detect"][k]),
                 trust=float(believed[k]),
                 blind=0.0,

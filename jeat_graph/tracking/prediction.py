@@ -53,8 +53,8 @@ def predicted(
         F = singer.in_perspective(model.F, whole, dt, c)
         whole, spread = singer.predict(whole, spread, model, F, q, 0.0, c)
         mean, covariance = whole[..., : singer.MOTION], spread[..., : singer.MOTION, : singer.MOTION]
-    variance = np.diagonal(covariance, axis1=2, axis2=3).reshape(-1, 2 * singer.STATES)
-    flat = mean.reshape(-1, 2 * singer.STATES)
+    variance = np.diagonal(covariance, axis1=2, axis2=3).reshape(-1, 2 * singer.MOTION)
+    flat = mean.reshape(-1, 2 * singer.MOTION)
     _, ids, _, _, real, used, label, share = rows
     return (np.full(len(mean), t), ids, flat, variance, real, 0 * used, label, share), covariance
 

@@ -38,6 +38,7 @@ from jeat_graph.tracking.reference_life import (
     begin_tracks,
     compare_overlaps,
     compare_sensors,
+    count_false_boxes,
     end_tracks,
     judge,
     learn,
@@ -123,6 +124,8 @@ def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelC
         records.append(record(before, state.tracks, transition))
     compare_overlaps(state)
     judge(state, c)
+    for given, taker in zip(scans, takers, strict=True):
+        count_false_boxes(state, given.sensor, taker, c)
     learn(state, t, c)
     out = Reported(state.tracks, report(state, t, c), takers, records, nis, noise_scale)
     end_tracks(state, t, c)

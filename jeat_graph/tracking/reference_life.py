@@ -79,6 +79,13 @@ def judge(state: ReferenceState, c: ModelConstants) -> None:
     state.tracks = replace(state.tracks, real=belief.real, log_odds=belief.log_odds)
 
 
+def count_false_boxes(state: ReferenceState, sensor: int, taker: IntArray, c: ModelConstants) -> None:
+    """Keep the mean number of a sensor's boxes a scan that are of nothing real, by their takers (M,)."""
+    real = state.tracks.real[np.searchsorted(state.tracks.track_id, taker)]
+    mean = c.clutter_memory * state.false_boxes[sensor] + (1.0 - c.clutter_memory) * (1.0 - real).sum()
+    state.false_boxes[sensor] = mean
+
+
 def learn(state: ReferenceState, t: float, c: ModelConstants) -> None:
     """Learn what the sensors are worth from tracks that live and from those that ended."""
     if t - state.learnt_s >= c.learn_period_s:

@@ -325,6 +325,7 @@ class ReferenceModel:
             **state.sensors._asdict(),
             "log_side_variance": state.log_side_variance,
             "leftovers": state.leftovers,
+            "false_boxes": state.false_boxes,
             "offsets": sensor_offsets.offsets(state.offsets, state.log_side_variance, self.constants),
             "boxes_at_edge": state.boxes_at_edge,
             "boxes_beyond": state.boxes_beyond,

@@ -141,6 +141,7 @@ class ReferenceState:
         offsets: what two sensors' boxes differ by. `compare_sensors`
         log_side_variance: (S,) ln ρ² of the sensors' sides. `learn_noise`
         leftovers: (S,) running mean of boxes a scan that no track takes. `count_clutter`
+        false_boxes: (S,) the same of boxes that are of nothing real. `count_false_boxes`
         period_s: (S,) running mean of the time between two scans (s); NaN before the second. `look`
         last_look_s: (S,) time of the last scan (s); NaN before it. `look`
         boxes_at_edge, boxes_beyond: (S,) boxes that end at the edge of the picture, and beyond it. `look`
@@ -164,6 +165,7 @@ class ReferenceState:
     offsets: OffsetSums
     log_side_variance: FloatArray
     leftovers: FloatArray
+    false_boxes: FloatArray
     period_s: FloatArray
     last_look_s: FloatArray
     boxes_at_edge: FloatArray
@@ -207,6 +209,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         offsets=sensor_offsets.no_offsets(),
         log_side_variance=none,
         leftovers=none,
+        false_boxes=none,
         period_s=none,
         last_look_s=none,
         boxes_at_edge=none,
@@ -228,6 +231,7 @@ def declare_sensor(
     state.offsets = sensor_offsets.widened(state.offsets)
     state.log_side_variance = np.append(state.log_side_variance, 2.0 * math.log(c.side_std))
     state.leftovers = np.append(state.leftovers, c.first_leftovers)
+    state.false_boxes = np.append(state.false_boxes, c.first_leftovers)
     state.period_s = np.append(state.period_s, np.nan)
     state.last_look_s = np.append(state.last_look_s, np.nan)
     state.boxes_at_edge = np.append(state.boxes_at_edge, 0.0)

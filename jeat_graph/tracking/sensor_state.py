@@ -6,22 +6,19 @@ from typing import NamedTuple
 
 
 class SensorState(NamedTuple):
-    """Running estimates of one sensor; they weigh what it says.
+    """Running estimates of one sensor.
 
     Attributes:
-        clutter: expected false boxes in a scan.
-        p_detect: mean probability that it detects a confirmed track.
-        trust: factor on the weight of its evidence, as far as the other sensors bear it out, in (0, 1].
-        blind: probability that it is blind as a whole now: finds nothing, whatever is there.
-        noise_scale: mean factor on its noise variance over the confirmed tracks (paper eq. 5), 1 without any.
-        offset_centre_share: what its centres are off by beside those of others, as a share of the side;
-        offset_centre_px: and by so much whatever the size (px), in the middle of where vehicles have been.
-        offset_log_size: what its ln width and ln height are off by.
-        offset_place_x: what its centres are off by for each px to the right of that middle (px per px),
-        offset_place_y: and for each px below it. All of these are taken off its boxes.
-        lag_s: by how much its boxes are older than the youngest sensor's, as moving vehicles tell (s);
-        lag_std_s: the standard deviation of that, None before there is any. It is not taken off:
-            `sensors.*.latency_s` does that.
+        clutter: mean number of boxes in a scan that no track takes.
+        p_detect: mean probability that it detects an object that it can see.
+        trust: probability that an object that it reports again and again is real, in (0, 1].
+        blind: 0; not estimated.
+        noise_scale: variance of its boxes over the prior one; of the engine `paper` the mean of eq. 5.
+        offset_centre_share: offset of its boxes' centres from those of the other sensors, as a share of the
+            side; it is subtracted from its boxes, and so is
+        offset_log_size: that of ln width and ln height.
+        offset_centre_px, offset_place_x, offset_place_y: 0; not estimated.
+        lag_s, lag_std_s: 0 and None; not estimated while tracking (`calibrate` does).
     """
 
     clutter: float

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any, Self, cast
 
 from jeat_graph.config.reading import as_config
-from jeat_graph.config.schema import Config
-from jeat_graph.config.tracker import ENGINES
+from jeat_graph.config.schema import Config, Preset
+from jeat_graph.config.tracker import ENGINES, Engine
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.tracking.model_tracker import ModelTracker
@@ -21,7 +21,8 @@ class Tracker(ModelTracker):
     Sensors may have any names and are known from their first scan on.
 
     Args:
-        config: sensors and settings, from `load_config`; or the name of a preset, or of a YAML file.
+        config: sensors and settings, from `load_config`; or the name of a preset (`default`, `paper`), or of
+            a YAML file.
         image: width and height of the picture (px), also as "1920x1080", if not those of the configuration.
         diagnostics: take down how well each detection fitted its track, for `last_updates`.
         engine: "core", "reference" or "paper", if not that of the configuration.
@@ -36,7 +37,11 @@ class Tracker(ModelTracker):
     """
 
     def __new__(
-        cls, config: Config | str | Path = "default", *, engine: str | None = None, **settings: Any
+        cls,
+        config: Config | Preset | str | Path = "default",
+        *,
+        engine: Engine | None = None,
+        **settings: Any,
     ) -> Self:
         """Return a tracker of an engine.
 
@@ -55,11 +60,11 @@ class Tracker(ModelTracker):
 
     def __init__(
         self,
-        config: Config | str | Path = "default",
+        config: Config | Preset | str | Path = "default",
         *,
         image: tuple[float, float] | str | None = None,
         diagnostics: bool = False,
-        engine: str | None = None,
+        engine: Engine | None = None,
         constants: ModelConstants | None = None,
     ) -> None:
         config = as_config(config)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -40,7 +40,7 @@ class Updates:
         scores: npt.ArrayLike | None = None,
         classes: npt.ArrayLike | None = None,
         embeddings: npt.ArrayLike | None = None,
-        format: str | None = None,  # what users of other libraries call it
+        format: Literal["ltwh", "xyxy", "xywh"] | None = None,  # what users of other libraries call it
     ) -> Trajectories:
         """Take in what a detector returned for one picture.
 

@@ -50,6 +50,25 @@ def test_a_place_tells_boxes_and_their_tracks(folder, capsys):
     assert "track 2, existence 0." in text
 
 
+def test_terms_have_the_names_of_their_sensors_whoever_looks_first(tmp_path, capsys):
+    """The one that finds the car has names after and before the other's: what it says is the same."""
+    terms = []
+    for found, empty in (("a", "z"), ("z", "a")):
+        rows = ["t,sensor,left,top,width,height,score"]
+        for k in range(SCANS):
+            rows.append(f"{k / RATE_HZ + 0.01},{empty},,,,,")
+            rows.append(f"{k / RATE_HZ},{found},{100 + 8 * k},300,80,50,0.9")
+        (tmp_path / "d.csv").write_text("\n".join(rows) + "\n")
+        out = tmp_path / found
+        assert main(["track", str(tmp_path / "d.csv"), "--out", str(out), "--image", "1280x720"]) == 0
+        capsys.readouterr()
+        assert main(["explain", str(out), "--track", "1", "--detections", str(tmp_path / "d.csv")]) == 0
+        text = capsys.readouterr().out.split("log odds", 1)[1].splitlines()[0]
+        terms.append(text.replace(f"{found}: ", "found: ").replace(f"{empty}: ", "empty: "))
+    assert "found: scores +" in terms[0]
+    assert terms[0] == terms[1]
+
+
 def test_a_place_where_nothing_is(folder, capsys):
     assert "no sensor has a box, and no track is there" in explained(folder, capsys, "--at", "1,600,600")
 

@@ -1,4 +1,5 @@
 // Binds the tracker's step.
+#include <array>
 #include <optional>
 
 #include <nanobind/stl/optional.h>
@@ -191,6 +192,9 @@ public:
         std::vector<double> leftovers;
         for (const Sensor& sensor : state.sensors) leftovers.push_back(sensor.leftovers);
         out["leftovers"] = array_of(leftovers);
+        std::vector<double> false_boxes;
+        for (const Sensor& sensor : state.sensors) false_boxes.push_back(sensor.false_boxes);
+        out["false_boxes"] = array_of(false_boxes);
         std::vector<double> at_edge, beyond;
         for (const Sensor& sensor : state.sensors)
             at_edge.push_back(sensor.boxes_at_edge), beyond.push_back(sensor.boxes_beyond);

@@ -140,8 +140,9 @@ void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_
 }
 
 template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix, Sensor& sensor) {
-    auto& [leftovers, boxes_at_edge, boxes_beyond, period_s, last_look_s, repetition, even_logit, sees_changes] = sensor;
+    auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_look_s, repetition, even_logit, sees_changes] = sensor;
     v.numbers(prefix + "leftovers", &leftovers, 1);
+    v.numbers(prefix + "false_boxes", &false_boxes, 1);
     v.numbers(prefix + "boxes_at_edge", &boxes_at_edge, 1);
     v.numbers(prefix + "boxes_beyond", &boxes_beyond, 1);
     v.numbers(prefix + "period_s", &period_s, 1, Values::any);

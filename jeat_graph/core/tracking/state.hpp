@@ -73,6 +73,7 @@ struct Tracks {
 // One sensor, beside what SensorBelief and OffsetSums have of it.
 struct Sensor {
     double leftovers;                                             // count_clutter
+    double false_boxes = 0.0;                                     // count_false_boxes
     double boxes_at_edge = 0.0, boxes_beyond = 0.0;               // look
     double period_s = std::numeric_limits<double>::quiet_NaN();   // look
     double last_look_s = std::numeric_limits<double>::quiet_NaN();
@@ -123,7 +124,7 @@ struct State {
         offsets.widen();
         log_side_variance.push_back(2.0 * log_of(constants.side_std));
         Sensor sensor;
-        sensor.leftovers = constants.first_leftovers;
+        sensor.leftovers = sensor.false_boxes = constants.first_leftovers;
         sensor.even_logit = even_logit;
         sensor.sees_changes = sees_changes;
         sensors.push_back(std::move(sensor));

@@ -65,6 +65,7 @@ public:
         }
         compare_overlaps();
         judge();
+        count_false_boxes(scans);
         learn(t);
         report(reported);
         if (!record) return;
@@ -447,6 +448,20 @@ private:
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             tracks.log_odds[i] = rule(tracks.evidence, i).log_odds;
             tracks.real[i] = expit(tracks.log_odds[i]);
+        }
+    }
+
+    // Keep the mean number of a sensor's boxes a scan that are of nothing real.
+    void count_false_boxes(const std::vector<Scan>& scans) {
+        const Tracks& tracks = s_.tracks;
+        for (const Scan& scan : scans) {
+            double found = 0.0;
+            for (const std::int64_t taker : scan.takers) {
+                const auto place = std::lower_bound(tracks.track_id.begin(), tracks.track_id.end(), taker);
+                found += 1.0 - tracks.real[static_cast<std::size_t>(place - tracks.track_id.begin())];
+            }
+            double& mean = s_.sensors[scan.sensor].false_boxes;
+            mean = c_.clutter_memory * mean + (1.0 - c_.clutter_memory) * found;
         }
     }
 

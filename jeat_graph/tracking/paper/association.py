@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.tracking.paper.kalman import noise_of
-from jeat_graph.tracking.paper.state import Found, Tracks
+from jeat_graph.tracking.paper.state import Found, PaperTracks
 
 _HAIR = 1.000001
 
@@ -32,7 +32,7 @@ class Pairs(NamedTuple):
         return Pairs(self.row[which], self.detection[which], self.d2[which])
 
 
-def gated_pairs(tracks: Tracks, found: Found, gate: float) -> Pairs:
+def gated_pairs(tracks: PaperTracks, found: Found, gate: float) -> Pairs:
     """List the pairs whose squared Mahalanobis distance is inside the gate (paper eq. 5).
 
     d² = yᵀ S⁻¹ y with y = z − H x and S = H P Hᵀ + R; S is a multiple of the unit matrix here. Detections are

@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.config.paper import PaperConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.tracking.paper.state import Found, Tracks
+from jeat_graph.tracking.paper.state import Found, PaperTracks
 
 #: Dimension n_z of a measured centre (paper eq. 6).
 MEASURED = 2
@@ -66,7 +66,7 @@ def move(mean: FloatArray, cov: FloatArray, F: FloatArray, Q: FloatArray) -> tup
     return mean @ F.T, F @ cov @ F.T + Q
 
 
-def predict(tracks: Tracks, dt: float, config: PaperConfig) -> Tracks:
+def predict(tracks: PaperTracks, dt: float, config: PaperConfig) -> PaperTracks:
     """Predict all tracks by `dt` seconds (paper eq. 2); what the step before used is forgotten."""
     used = np.zeros(len(tracks), dtype=np.int64)
     if dt <= 0.0 or not len(tracks):
@@ -102,7 +102,7 @@ def correct(
     return mean + y[:, :, None] * gain[:, None], after, (y * y).sum(axis=1) / S
 
 
-def noise_of(tracks: Tracks, row: IntArray, found: Found, detection: IntArray) -> FloatArray:
+def noise_of(tracks: PaperTracks, row: IntArray, found: Found, detection: IntArray) -> FloatArray:
     """Return R = s R_base g(p) (K,) of detections of tracks, along either axis (px²)."""
     return tracks.scale[row, found.sensor[detection]] * found.noise[detection]
 
@@ -122,8 +122,8 @@ def adapted(scale: FloatArray, nis: FloatArray, config: PaperConfig) -> FloatArr
 
 
 def update(
-    tracks: Tracks, row: IntArray, found: Found, detection: IntArray, t: float, config: PaperConfig
-) -> Tracks:
+    tracks: PaperTracks, row: IntArray, found: Found, detection: IntArray, t: float, config: PaperConfig
+) -> PaperTracks:
     """Let tracks take detections in (paper eq. 4 and 6).
 
     Args:
@@ -155,7 +155,7 @@ _WRITTEN = ("mean", "cov", "size_mean", "size_cov", "scale", "hits", "t_update",
 
 def born(
     found: Found, detection: IntArray, t: float, first_id: int, sensors: int, config: PaperConfig
-) -> Tracks:
+) -> PaperTracks:
     """Start a track at each of some detections (K,): at rest, as surely as the settings say."""
     n = len(detection)
     mean, size_mean = np.zeros((n, 2, 3)), np.zeros((n, 2, 2))
@@ -164,7 +164,7 @@ def born(
     cov[:, 0, 0], size_cov[:, 0, 0] = found.noise[detection], found.log_size_var[detection]
     cov[:, 1, 1], cov[:, 2, 2] = config.velocity_std_px**2, config.acceleration_std_px**2
     size_cov[:, 1, 1] = config.size_rate_std**2
-    return Tracks(
+    return PaperTracks(
         track_id=first_id + np.arange(n),
         mean=mean,
         cov=cov,

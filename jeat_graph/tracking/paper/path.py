@@ -218,7 +218,7 @@ def solve(paths: Sequence[TrackPath], counts: Sequence[int], whole: bool = False
     known = [path.solved_ends() for path in paths]
     state: _Ends | None = None
     for back in range(max((path.number for path in paths), default=0)):
-        # Tracks that have more segments stand first.
+        # PaperTracks that have more segments stand first.
         active = [i for i in order if paths[i].number > back]
         pieces = [paths[i].pieces[-1 - back] for i in active]
         filtered = _filtered_ends(pieces)

@@ -18,7 +18,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.paper.path import PathEngine, Rows, TrackPath, solve
 from jeat_graph.tracking.paper.segmenting import cut_segments
-from jeat_graph.tracking.paper.state import Tracks, sizes_of
+from jeat_graph.tracking.paper.state import PaperTracks, sizes_of
 from jeat_graph.tracking.paper.table import boxes_at
 
 #: Steps in a segment: GTSAM solves for one state in so many. More would hardly be faster.
@@ -48,7 +48,7 @@ class StepTaken(NamedTuple):
     t: float
     births: int
     ids: IntArray
-    tracks: Tracks
+    tracks: PaperTracks
     z: FloatArray
     information: FloatArray
     sensors: tuple[str, ...]

@@ -13,7 +13,7 @@ MOST_LOG_SIZE = 12.0
 
 
 @dataclass(frozen=True, eq=False)
-class Tracks:
+class PaperTracks:
     """N tracks in the order of their identities. A step makes new arrays and never writes into old ones.
 
     The axes x and y are independent and equally noisy, so both have the same covariance; so have width and
@@ -49,10 +49,10 @@ class Tracks:
         return len(self.track_id)
 
     @staticmethod
-    def none(sensors: int) -> Tracks:
+    def none(sensors: int) -> PaperTracks:
         """Return no tracks, for so many sensors."""
         whole = np.zeros(0, dtype=np.int64)
-        return Tracks(
+        return PaperTracks(
             track_id=whole,
             mean=np.zeros((0, 2, 3)),
             cov=np.zeros((0, 3, 3)),
@@ -66,16 +66,16 @@ class Tracks:
             used=whole,
         )
 
-    def take(self, rows: BoolArray | IntArray) -> Tracks:
+    def take(self, rows: BoolArray | IntArray) -> PaperTracks:
         """Return some of the tracks."""
-        return Tracks(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+        return PaperTracks(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
-    def join(self, more: Tracks) -> Tracks:
+    def join(self, more: PaperTracks) -> PaperTracks:
         """Return these tracks and those behind them."""
         pairs = {f.name: (getattr(self, f.name), getattr(more, f.name)) for f in fields(self)}
-        return Tracks(**{name: np.concatenate(pair) for name, pair in pairs.items()})
+        return PaperTracks(**{name: np.concatenate(pair) for name, pair in pairs.items()})
 
-    def with_sensors(self, sensors: int) -> Tracks:
+    def with_sensors(self, sensors: int) -> PaperTracks:
         """Return the same tracks with room for the noise of further sensors."""
         new = np.ones((len(self), sensors - self.scale.shape[1]))
         return replace(self, scale=np.concatenate([self.scale, new], axis=1))

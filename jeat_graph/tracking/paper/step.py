@@ -11,7 +11,7 @@ from jeat_graph.config.paper import PaperConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.tracking.paper.association import gated_pairs, match, second_views
 from jeat_graph.tracking.paper.kalman import born, noise_of, predict, update
-from jeat_graph.tracking.paper.state import Found, Tracks
+from jeat_graph.tracking.paper.state import Found, PaperTracks
 
 #: After so long without any scan all tracks are over: longer predictions outgrow a double's digits (s).
 LONGEST_SILENCE_S = 300.0
@@ -28,14 +28,14 @@ class Stepped(NamedTuple):
         information: (N,) of that mean along either axis, 0 where there was none, and at birth (1/px²).
     """
 
-    tracks: Tracks
+    tracks: PaperTracks
     births: int
     taker: IntArray
     z: FloatArray
     information: FloatArray
 
 
-def step(tracks: Tracks, t: float, dt: float, found: Found, first_id: int, config: PaperConfig) -> Stepped:
+def step(tracks: PaperTracks, t: float, dt: float, found: Found, first_id: int, config: PaperConfig) -> Stepped:
     """Advance all tracks to the time of some detections and take these in (paper algorithm 1).
 
     Args:
@@ -52,7 +52,7 @@ def step(tracks: Tracks, t: float, dt: float, found: Found, first_id: int, confi
     taker = np.zeros(len(found), dtype=np.int64)
     weighed, information = np.zeros((len(tracks), 2)), np.zeros(len(tracks))
 
-    def take(row: IntArray, detection: IntArray) -> Tracks:
+    def take(row: IntArray, detection: IntArray) -> PaperTracks:
         told = 1.0 / noise_of(tracks, row, found, detection)
         information[row] += told
         weighed[row] += told[:, None] * found.z[detection]
@@ -80,13 +80,13 @@ def step(tracks: Tracks, t: float, dt: float, found: Found, first_id: int, confi
     return Stepped(tracks.take(alive).join(new), len(left), taker, z, information)
 
 
-def confirm(tracks: Tracks, t: float, config: PaperConfig) -> Tracks:
+def confirm(tracks: PaperTracks, t: float, config: PaperConfig) -> PaperTracks:
     """Confirm the tracks that are old enough and have hits enough (paper eq. 7)."""
     earned = (t - tracks.t_birth >= config.confirm_age_s) & (tracks.hits >= config.confirm_hits)
     return replace(tracks, confirmed=tracks.confirmed | earned)
 
 
-def lives(tracks: Tracks, t: float, config: PaperConfig) -> IntArray:
+def lives(tracks: PaperTracks, t: float, config: PaperConfig) -> IntArray:
     """Return the rows of the tracks that go on: t − t_last_update ≤ τ_max (paper eq. 8).
 
     A state that overflowed, as of a track that coasts on wild input, is over as well.

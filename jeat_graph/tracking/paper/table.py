@@ -8,12 +8,12 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.classes import ClassTally
-from jeat_graph.tracking.paper.state import Tracks
+from jeat_graph.tracking.paper.state import PaperTracks
 from jeat_graph.tracking.prediction import Prediction
 
 
 def table_of(
-    tracks: Tracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
+    tracks: PaperTracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
 ) -> Trajectories:
     """Write tracks as a table: what is confirmed is taken for a vehicle, existence 1."""
     size = tracks.sizes()
@@ -53,7 +53,7 @@ def boxes_at(centre: FloatArray, size: FloatArray, config: Config) -> tuple[Floa
 
 
 def predicted(
-    tracks: Tracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
+    tracks: PaperTracks, t: float, config: Config, sensors: tuple[str, ...], classes: ClassTally | None
 ) -> Prediction:
     """Write predicted tracks as a table with covariances; those that have left the picture are left out."""
     table = table_of(tracks, t, config, sensors, classes)

@@ -26,7 +26,7 @@ from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names
 from jeat_graph.tracking.paper.kalman import predict
 from jeat_graph.tracking.paper.smoothing import PaperSmoothers, StepTaken
-from jeat_graph.tracking.paper.state import Found, Tracks
+from jeat_graph.tracking.paper.state import Found, PaperTracks
 from jeat_graph.tracking.paper.step import step
 from jeat_graph.tracking.paper.table import predicted, table_of
 from jeat_graph.tracking.prediction import Prediction
@@ -50,7 +50,7 @@ class PaperSnapshot(NamedTuple):
 
     t: float | None
     next_id: int
-    tracks: Tracks
+    tracks: PaperTracks
     classes: ClassTally | None
     sensor_names: tuple[str, ...]
 
@@ -85,7 +85,7 @@ class PaperTracker:
         self.sensor_names = self.config.sensor_names
         self._settings: PaperConfig = self.config.paper
         self._common = CommonPicture.of(self.config)
-        self._tracks = Tracks.none(len(self.sensor_names))
+        self._tracks = PaperTracks.none(len(self.sensor_names))
         self._t: float | None = None
         self._next_id = 1
         self._classes: ClassTally | None = None
@@ -308,7 +308,7 @@ class PaperTracker:
             raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
         return self._smoothers
 
-    def _reported(self) -> Tracks:
+    def _reported(self) -> PaperTracks:
         return self._tracks.take(self._tracks.confirmed)
 
     def _with_met(self, batch: Sequence[Scan]) -> tuple[str, ...]:
