@@ -35,7 +35,9 @@ class Stepped(NamedTuple):
     information: FloatArray
 
 
-def step(tracks: PaperTracks, t: float, dt: float, found: Found, first_id: int, config: PaperConfig) -> Stepped:
+def step(
+    tracks: PaperTracks, t: float, dt: float, found: Found, first_id: int, config: PaperConfig
+) -> Stepped:
     """Advance all tracks to the time of some detections and take these in (paper algorithm 1).
 
     Args:
