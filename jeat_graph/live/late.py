@@ -22,7 +22,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Arrival, Taken, looked_last
 from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.repetition import Repetition
-from jeat_graph.live.rewinding import Rewinding, ReplayableStep
+from jeat_graph.live.rewinding import ReplayableStep, Rewinding
 from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
@@ -254,7 +254,7 @@ class LiveTracker:
         return self.tracker.finish()
 
     def _meet(self, scans: Sequence[Scan]) -> None:
-        """Refuse sensors that are not declared and may not be, and know those that look for the first time."""
+        """Refuse sensors that are not declared and may not be; know those that look for the first time."""
         self.tracker.meet(scans)
         for scan in scans:
             if scan.sensor not in self._late_s:
