@@ -15,6 +15,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, InputWarning
+from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.progress import progress_to, refreshing
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.formats import BY_FRAME
@@ -190,7 +191,7 @@ class RunSteps:
         record.timings["step_p99_ms"] = round(1e3 * float(np.quantile(step_s, 0.99)), 4)
         record.counts |= {"tracks_born": self._tracker.num_born, "tracks_reported": len(self._reported)}
         states = self._tracker.sensor_states()
-        record.learnt = {name: one._asdict() for name, one in states.items()}
+        record.learnt = {name: nan_as_null(one._asdict()) for name, one in states.items()}
         for line in late_clocks(states):
             record.warnings.append(line)
             warnings.warn(line, InputWarning, stacklevel=2)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import json
+
 import numpy as np
 import pytest
 
@@ -172,6 +175,27 @@ def test_a_sensor_that_nobody_declared_is_met_or_refused():
     met.step((0.1, "somebody", [[1, 1, 20, 20]], [0.5]))
     assert "somebody" in met.tracker.config.sensors
     assert met.lateness.summary()["somebody"].scans == 1
+
+
+def no_number(name):
+    raise AssertionError(f"{name} is no JSON")
+
+
+@pytest.mark.parametrize("preset", ["default", "paper"])
+def test_a_stream_of_sensors_that_nobody_declared_ends_with_a_record(preset, tmp_path, monkeypatch):
+    box = {"boxes": [[100, 100, 40, 30]], "scores": [0.9]}
+    lines = [json.dumps({"t": 0.05 * k, "sensor": ("cam", "evt")[k % 2], **box}) for k in range(80)]
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines).encode())))
+    record = tmp_path / "record.json"
+    assert main(["stream", "--config", preset, "--record", str(record)]) == 0
+    learnt = json.loads(record.read_text(), parse_constant=no_number)["learnt"]
+    assert {"cam", "evt"} <= learnt.keys()
+    rows = [f"{0.05 * k},cam,100,100,40,30,0.9" for k in range(40)]
+    table = tmp_path / "d.csv"
+    table.write_text("\n".join(["t,sensor,left,top,width,height,score", *rows]))
+    assert main(["track", str(table), "--config", preset, "--out", str(tmp_path / "run")]) == 0
+    run = json.loads((tmp_path / "run" / "run.json").read_text(), parse_constant=no_number)
+    assert "cam" in run["learnt"]
 
 
 def test_what_will_be_is_said_by_the_identities_that_were_given_out():
