@@ -133,8 +133,8 @@ class SensorHealth:
                 self.rubbish.append(name)
                 text = (
                     f"sensor {name!r} delivers rubbish: {state.clutter:.3g} false boxes a scan "
-                    f"({usual[0]:.3g} usually), noise variance {state.noise_scale / usual[1]:.3g} times as usual, "
-                    f"{100.0 * state.trust:.2g} % of what it finds are real; it weighs less"
+                    f"({usual[0]:.3g} usually), noise variance {state.noise_scale / usual[1]:.3g} times as "
+                    f"usual, {100.0 * state.trust:.2g} % of what it finds are real; it weighs less"
                 )
                 events.append(HealthChange(now, name, RUBBISH, text))
             elif worst < AGAIN and name in self.rubbish:
