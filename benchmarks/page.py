@@ -60,9 +60,8 @@ Our tracker has the settings of its preset, and the other trackers have the defa
 They get no images: BoT-SORT and McByte run without camera-motion compensation and without masks. Of
 several detectors the slowest sets their frames, and non-maximum suppression merges the boxes.
 
-A preset should not be judged on a set that it was chosen on. The column *in view* counts the recordings
-that were looked at while the constants were chosen. `--left-out SET=FILE` adds a row for a configuration
-that was chosen without a set."""
+A tracker should not be judged on a set that its constants were chosen on. The column *in view* counts the
+recordings that were looked at while ours were chosen."""
 
 
 def write_page(path: Path, result: Mapping[str, Any], tables: Mapping[str, Table]) -> None:

@@ -95,6 +95,7 @@ def judge_scene(job: tuple[str, int, float]) -> list[dict[str, Any]]:
     from jeat_graph.road.camera import PARAMETERS
     from jeat_graph.road.camera_file import read_camera
     from jeat_graph.road.run_tables import write_run_tables
+    from jeat_graph.runs.measured import measurement_rows
     from jeat_graph.runs.run_options import RunOptions
     from jeat_graph.runs.track_files import TrackRequest, track_files
     from jeat_graph_sehn.simulation.dataset.detection_set import write_detection_set
@@ -111,12 +112,13 @@ def judge_scene(job: tuple[str, int, float]) -> list[dict[str, Any]]:
         spread = np.array([_SPREAD.get(name, 0.0) for name in PARAMETERS])
         change = spread * np.random.default_rng(seed).standard_normal(len(spread))
         wrong = replace(exact.moved(change), covariance=np.diag(spread**2))
+        config = measurement_rows(run)[1]
         for name, camera in zip(_CAMERAS, (exact, wrong), strict=True):
-            write_run_tables(run, load_config("default"), camera)
+            write_run_tables(run, config, camera)
             for table, scores in judge_road_run(run, scene / "gt_road.csv").items():
                 kind = table.removeprefix("road_")
                 out.append({"scenario": scenario, "seed": seed, "camera": name, "table": kind, **scores})
-        for kind, scores in judge_engines(run, scene / "gt_road.csv", load_config("default"), exact).items():
+        for kind, scores in judge_engines(run, scene / "gt_road.csv", exact).items():
             out.append({"scenario": scenario, "seed": seed, "camera": "exact", "table": kind, **scores})
     return out
 

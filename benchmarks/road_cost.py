@@ -43,7 +43,7 @@ def causal_cost(duration_s: float) -> dict[str, Any]:
             read_detections(Path(folder) / "detections.csv"),
         )
     tracker = Tracker(alone, image=(camera.width, camera.height), diagnostics=True)
-    road, times, tables, taken = RoadFilter(camera, alone), list[tuple[float, float]](), list[float](), []
+    road, times, tables, taken = RoadFilter(camera), list[tuple[float, float]](), list[float](), []
     for scan in detections.scans():
         begin = time.thread_time()
         table = tracker.step(scan)
@@ -69,7 +69,7 @@ def lag_cost(duration_s: float) -> dict[str, Any]:
     from jeat_graph.road.fixed_lag import RoadFixedLag
 
     camera, log = many_vehicles(duration_s)
-    smoother = RoadFixedLag(camera, load_config("default"))
+    smoother = RoadFixedLag(camera)
     begin, cut = 0.0, _LEAVE_OUT_S  # what is compiled and imported first is not counted
     for rows in np.split(log, np.flatnonzero(np.diff(log["t"])) + 1):
         t = float(rows["t"][0])

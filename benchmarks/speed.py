@@ -18,7 +18,7 @@ from jeat_graph.data.extras import install
 
 OBJECTS = (10, 50, 200, 1000)
 VEHICLES = (30, 100, 300)
-ENGINES = ("none", "fixed-lag", "fixed-lag-rts", "rts")
+ENGINES = ("none", "fixed-lag", "full")
 _HOUR = 60 * SCANS_A_MINUTE
 
 

@@ -19,7 +19,6 @@ OURS = {
     "default": ("default", "none"),
     "paper": ("paper", "none"),
     "default + fixed-lag": ("default", "fixed-lag"),
-    "default + fixed-lag-rts": ("default", "fixed-lag-rts"),
 }
 #: Peers of the package `trackers`, by their key in `eval.baselines.BASELINES`.
 PEERS = ("bytetrack", "sort", "ocsort")

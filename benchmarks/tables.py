@@ -84,13 +84,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="changes",
         help="change a setting of them",
     )
-    add(
-        "--left-out",
-        action="append",
-        default=[],
-        metavar="SET=FILE",
-        help="a configuration that was chosen without this set: a row of its own there",
-    )
     add("--no-peers", action="store_true", help="leave the other trackers out")
     add(
         "--copies",
@@ -119,13 +112,12 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     for one in subjects:
         load_config(one.config or "default", one.changes)  # a wrong key is said before hours of tracking
     groups = _sets(args)
-    left_out = _left_out(args.left_out, groups)
     peers = [] if args.no_peers or args.quick else [Contender(NAMES[key], peer=key) for key in peers_here()]
     jobs = [
         JudgeJob(subject, group, stream, args.copies)
         for group in groups
         for stream in group.streams
-        for subject in (*subjects, *left_out.get(group.name, ()), *peers)
+        for subject in (*subjects, *peers)
     ]
     records = in_processes(judge, jobs, args.jobs, args.kind)
     settings = {
@@ -165,18 +157,6 @@ def _named(text: str) -> tuple[str, Path]:
     return name, Path(folder)
 
 
-def _left_out(texts: Sequence[str], groups: Sequence[RecordingSet]) -> dict[str, list[Contender]]:
-    out: dict[str, list[Contender]] = {}
-    for text in texts:
-        name, sign, file = text.partition("=")
-        if not sign or name not in {group.name for group in groups}:
-            there = ", ".join(group.name for group in groups)
-            raise ConfigError(f"--left-out {text}: must be SET=FILE, with one of the sets {there}")
-        load_config(file)
-        out.setdefault(name, []).append(Contender(f"{Path(file).stem}, chosen without this set", file))
-    return out
-
-
 def _command(args: argparse.Namespace) -> str:
     """The command that made a result, without what says where it is written."""
     words = [
@@ -192,16 +172,16 @@ def _command(args: argparse.Namespace) -> str:
         "duration",
         "worlds",
         "config",
-        "left_out",
         "copies",
     ):
         value = getattr(args, option, None)
         if not value or value == ["default"]:
             continue
         name = "--" + option.replace("_", "-")
-        each = option in ("detections", "left_out")
         values = [str(one) for one in (value if isinstance(value, list) else [value])]
-        words += [word for one in values for word in (name, one)] if each else [name, *values]
+        words += (
+            [word for one in values for word in (name, one)] if option == "detections" else [name, *values]
+        )
     words += [word for change in args.changes for word in ("--set", change)]
     words += [flag for flag, on in (("--quick", args.quick), ("--no-peers", args.no_peers)) if on]
     return " ".join(["python -m benchmarks", *words])

@@ -47,11 +47,11 @@ def states_at(
     at = last_record(track, t)
     ahead = np.asarray(t) - track.t[at]
     last = np.full(len(at), len(track) - 1, dtype=np.int64)
-    lagged = [_moved(track.smoothed_until(at, last_record(track, t + lag)), ahead) for lag in lags_s]
+    lagged = [_moved(track, track.smoothed_until(at, last_record(track, t + lag)), ahead) for lag in lags_s]
     return (
-        _moved((track.mean[at], track.covariance[at]), ahead),
+        _moved(track, (track.mean[at], track.covariance[at]), ahead),
         lagged,
-        _moved(track.smoothed_until(at, last), ahead),
+        _moved(track, track.smoothed_until(at, last), ahead),
     )
 
 
@@ -60,8 +60,8 @@ def last_record(track: FilteredTrack, t: FloatArray) -> IntArray:
     return np.asarray(np.searchsorted(track.t, np.asarray(t) + _COINCIDENT_S, side="right") - 1)
 
 
-def _moved(states: tuple[FloatArray, FloatArray], ahead: FloatArray) -> States:
+def _moved(track: FilteredTrack, states: tuple[FloatArray, FloatArray], ahead: FloatArray) -> States:
     """Move states (T, 2, D) ahead by some time (T,), and leave all but the motion out."""
-    mean, cov = states[0][:, :, :MOTION], states[1][:, :, :MOTION, :MOTION]
+    mean, cov = track.motion(states[0]), states[1][:, :, :MOTION, :MOTION]
     F = np.stack([transition(float(dt)) for dt in ahead])[:, None] if len(ahead) else np.zeros((0, 1, 3, 3))
     return States((F @ mean[..., None])[..., 0], F @ cov @ np.swapaxes(F, -1, -2))

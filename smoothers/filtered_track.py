@@ -35,6 +35,7 @@ class FilteredTrack:
         mean: (K, A, D) after it.
         covariance: (K, A, D, D).
         sensor: (K,) index of the sensor whose box was taken in, −1 where none was.
+        output: (3, D) what of a state is told as place, velocity and acceleration; None: its first three.
     """
 
     track_id: int
@@ -45,9 +46,14 @@ class FilteredTrack:
     mean: FloatArray
     covariance: FloatArray
     sensor: IntArray
+    output: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def motion(self, mean: FloatArray) -> FloatArray:
+        """Return what is told (..., 3) of states (..., D): place, velocity and acceleration."""
+        return mean[..., :MOTION] if self.output is None else np.asarray(mean @ self.output.T)
 
     def normalised_innovations(self) -> tuple[IntArray, FloatArray]:
         """Return the updates (M,) that measured something, and by how much they moved the place (M, A).

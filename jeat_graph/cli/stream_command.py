@@ -230,7 +230,7 @@ def _with_road(
     from jeat_graph.road.camera_file import read_camera
     from jeat_graph.road.lag_table import RoadFile, RoadLagTable
 
-    table = RoadLagTable(read_camera(args.camera), live.tracker.config)
+    table = RoadLagTable(read_camera(args.camera), live.tracker.config.smoother.lag_s)
     road = stack.enter_context(RoadFile(args.road, table))
 
     def both(t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:

@@ -8,9 +8,14 @@ import numpy as np
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.road.box_channels import HIGH, LOW, NEITHER, WHOLE
 from jeat_graph.road.box_errors import BoxRows
 from jeat_graph.road.camera import RoadCamera
+
+#: Share of the variance of detectors' boxes that lasts, and for how long (s), as the tracker takes them.
+LASTING_SHARE = ModelConstants().error_share / (1.0 + ModelConstants().error_share)
+MEMORY_S = ModelConstants().error_time_s
 
 _CUT_SIGMAS = 2.0  # a side this many standard deviations from the picture's edge may be cut off by it
 
@@ -35,34 +40,18 @@ class BoxConfig:
         check(self)
 
 
-@dataclass(frozen=True, eq=False)
-class SensorErrors:
-    """What is known of the sensors' errors.
-
-    Attributes:
-        memory_s: (S,) correlation time of each sensor's persisting error (s).
-        coloured_share: (S,) share of its variance that persists.
-    """
-
-    memory_s: FloatArray
-    coloured_share: FloatArray
-
-
-def rows_of_log(log: RecordArray, sensors: SensorErrors, size: tuple[int, int], config: BoxConfig) -> BoxRows:
+def rows_of_log(log: RecordArray, sensors: int, size: tuple[int, int], config: BoxConfig) -> BoxRows:
     """Boxes that a track took in, each with the noise with which the filter weighed it.
 
     Args:
         log: (M,) records of `filters.measurement.MEASUREMENT`, in order of time.
-        sensors: their errors' memory.
+        sensors: how many there are.
         size: width and height of the picture (px).
         config: thinning and edges.
     """
-    share = sensors.coloured_share[log["sensor"]][:, None]
-    scale = np.maximum(log["scale"], 1e-6)[:, None]
-    # The filter learns how much worse a sensor is than declared; its sizes are worse alike.
-    size_var = log["size_var"] * scale
-    white = np.concatenate([log["r"], size_var * (1.0 - share)], axis=1)
-    coloured = np.concatenate([log["coloured_std"], np.sqrt(size_var * share)], axis=1)
+    size_var = log["size_var"]
+    white = np.concatenate([log["r"], size_var * (1.0 - LASTING_SHARE)], axis=1)
+    coloured = np.concatenate([log["coloured_std"], np.sqrt(size_var * LASTING_SHARE)], axis=1)
     z = np.concatenate([log["z"], log["log_size"]], axis=1)
     rows = BoxRows(
         log["t"].astype(np.float64),
@@ -71,7 +60,7 @@ def rows_of_log(log: RecordArray, sensors: SensorErrors, size: tuple[int, int], 
         coloured,
         np.zeros((len(z), 2), dtype=np.int64),
         log["sensor"].astype(np.int64),
-        np.ascontiguousarray(sensors.memory_s, dtype=np.float64),
+        np.full(sensors, MEMORY_S),
     )
     return binned(cut_at_edges(rows, size, config), config)
 

@@ -11,17 +11,17 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.fields import check, number
-from jeat_graph.config.schema import Config
 from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.road.box_rows import LASTING_SHARE, MEMORY_S
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.fleet import CLASSES, EXTREMES, MOST_BEYOND
 from jeat_graph.road.results import columns_of_states
 from jeat_graph.road.road_state import ROAD_ROW, SPEED
 from jeat_graph.road.speeds import KMH
-from jeat_graph.road.taken_boxes import sensor_errors
 
-_OF_BOX = ("track_id", "sensor", "z", "r", "coloured_std", "log_size")
+_OF_BOX = ("track_id", "sensor", "z", "r", "coloured_std", "log_size", "size_var")
+_MOST_SENSORS = 63  # as many as a tracker takes
 _FORGET_EVERY = 512  # steps
 _GRID = (24, 14)  # places of the picture at which the calibration's share is worked out
 
@@ -41,7 +41,7 @@ class RoadFilterConfig:
     edge_px: float = number(2.0, "px", "a side this near the picture's edge is cut off by it")
     gate: float = number(9.0, "1", "squared residual / variance from which a box counts less", open_low=True)
     pause: float = number(
-        0.35, "1", "share of a sensor's memory within which a further box of it is left out", 0.0, 1.0
+        0.2, "1", "share of a sensor's memory within which a further box of it is left out", 0.0, 1.0
     )
     known_kmh: float = number(
         20.0, "km/h", "a speed that is less sure (standard deviation) is not known yet", open_low=True
@@ -73,20 +73,16 @@ class RoadFilter:
 
     Args:
         camera: the camera.
-        sensors: the tracker's configuration.
         config: how vehicles move.
     """
 
-    def __init__(
-        self, camera: RoadCamera, sensors: Config, config: RoadFilterConfig = RoadFilterConfig()
-    ) -> None:
-        errors = sensor_errors(sensors)
+    def __init__(self, camera: RoadCamera, config: RoadFilterConfig = RoadFilterConfig()) -> None:
         self._filter = core.Filter(
             camera.compiled(),
             config,
             *_fleet_sizes(),
             EXTREMES,
-            np.stack([errors.memory_s, errors.coloured_share], axis=1),
+            np.tile([MEMORY_S, LASTING_SHARE], (_MOST_SENSORS, 1)),
         )
         self._config = config
         self._steps = 0
@@ -104,10 +100,7 @@ class RoadFilter:
             (K,) records of `road_state.ROAD_ROW`: the states of those of them that stand on the road.
         """
         if len(rows):
-            of_tracks, sensors, *of_boxes = (np.ascontiguousarray(rows[name]) for name in _OF_BOX)
-            z, r, coloured_std, log_size = of_boxes
-            size_var = rows["size_var"] * rows["scale"][:, None]
-            self._filter.take(t, of_tracks, sensors, z, r, coloured_std, log_size, size_var)
+            self._filter.take(t, *(np.ascontiguousarray(rows[name]) for name in _OF_BOX))
         known, mean, var = self._filter.read(t, np.ascontiguousarray(ids, dtype=np.int64))
         self._steps += 1
         if self._steps % _FORGET_EVERY == 0:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from jeat_graph.config.fields import check, number
-from jeat_graph.config.schema import Config
 from jeat_graph.core import road as core
 from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.road.box_errors import BoxRows
@@ -32,9 +31,9 @@ from jeat_graph.road.road_factors import (
     first_state,
     jerk_of,
     trial_at,
+    with_sensors,
 )
 from jeat_graph.road.road_state import ROAD_ROW
-from jeat_graph.road.taken_boxes import sensor_errors
 from jeat_graph.smoothers.gtsam.shared_chain import (
     ChainRows,
     PriorRows,
@@ -103,7 +102,6 @@ class RoadFixedLag:
 
     Args:
         camera: the camera.
-        sensors: the tracker's configuration.
         config: how far behind, and how often.
         motion: how vehicles move.
     """
@@ -111,12 +109,11 @@ class RoadFixedLag:
     def __init__(
         self,
         camera: RoadCamera,
-        sensors: Config,
         config: RoadLagConfig = RoadLagConfig(),
         motion: MotionFitConfig = BOX_MOTION,
     ) -> None:
         self._camera, self._kernel = camera, camera.compiled()
-        self._errors = sensor_errors(sensors)
+        self._sensors = 0  # those that have given boxes so far
         self._config, self._motion = config, motion
         self._tracks: dict[int, _Track] = {}
         self._pending: list[RecordArray] = []
@@ -151,6 +148,7 @@ class RoadFixedLag:
         if self._pending:
             log = np.concatenate(self._pending)
             self._pending = []
+            self._sensors = max(self._sensors, int(log["sensor"].max()) + 1)
             log = log[np.lexsort((log["t"], log["track_id"]))]
             for part in np.split(log, np.flatnonzero(np.diff(log["track_id"])) + 1):
                 track = self._tracks.setdefault(int(part["track_id"][0]), _Track([], 0.0))
@@ -170,7 +168,7 @@ class RoadFixedLag:
     def _grow(self, track: _Track) -> bool:
         """Take in what has come, and solve; False where the vehicle is not before the camera any more."""
         log = np.concatenate(track.waiting)
-        rows = rows_of_log(log, self._errors, (self._camera.width, self._camera.height), BoxConfig())
+        rows = rows_of_log(log, self._sensors, (self._camera.width, self._camera.height), BoxConfig())
         if track.window is None:
             track.window = self._begun(rows)
             if track.window is None:
@@ -185,7 +183,10 @@ class RoadFixedLag:
             keys = self._keys(window.keys[-1], rows.t[-1])[1:]
             window.coefficients = _extended(window, keys)
             window.keys = np.concatenate([window.keys, keys])
-        window.rows = window.rows.followed_by(rows)
+        more = len(rows.memory_s) - len(window.rows.memory_s)
+        if more:  # a sensor has been met since
+            window.priors = [with_sensors(prior, more) for prior in window.priors]
+        window.rows = window.rows._replace(memory_s=rows.memory_s).followed_by(rows)
         return self._solve(window)
 
     def _begun(self, rows: BoxRows) -> _Window | None:

@@ -12,7 +12,6 @@ from typing import Any, BinaryIO, Self
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.table_writer import csv_lines
@@ -29,15 +28,13 @@ _FEW = 1000
 class RoadLagTable:
     """All vehicles' rows a fixed lag behind; feed it what each step of a tracker gave to its tracks.
 
-    The lag is that of the picture's smoother (`smoother.lag_s`).
-
     Args:
         camera: the camera.
-        sensors: the tracker's configuration.
+        lag_s: how far behind a row is final (s): as the picture's smoother has it, `smoother.lag_s`.
     """
 
-    def __init__(self, camera: RoadCamera, sensors: Config) -> None:
-        self._lag = RoadFixedLag(camera, sensors, RoadLagConfig(lag_s=sensors.smoother.lag_s))
+    def __init__(self, camera: RoadCamera, lag_s: float) -> None:
+        self._lag = RoadFixedLag(camera, RoadLagConfig(lag_s=lag_s))
         self._share = CalibrationShare(camera)
 
     def step(self, t: float, rows: RecordArray) -> Columns:

@@ -102,6 +102,18 @@ def first_state(config: MotionFitConfig, sensors: int, start: FloatArray) -> Pri
     return PriorRows(0, A, A[:, [0, 3]] @ start)
 
 
+def with_sensors(prior: PriorRows, more: int) -> PriorRows:
+    """Add the errors of further sensors to what is known of a state: none of their boxes has told of them."""
+    if prior.key is None:
+        return prior
+    (rows, states), errors = prior.A.shape, CHANNELS * more
+    A = np.zeros((rows + errors, states + errors))
+    A[:rows, :states], A[rows:, states:] = prior.A, np.eye(errors)
+    b = np.concatenate([prior.b, np.zeros(errors)])
+    B = None if prior.B is None else np.concatenate([prior.B, np.zeros((errors, prior.B.shape[1]))])
+    return PriorRows(prior.key, A, b, B)
+
+
 def jerk_of(config: MotionFitConfig) -> FloatArray:
     """Root spectral densities of jerk (2,) across and along the road (m/s^2.5)."""
     return np.asarray(config.jerk * np.array([config.lateral_factor, 1.0]))

@@ -18,11 +18,11 @@ from jeat_graph.io.trajectories_io import read_trajectories
 from jeat_graph.road.box_rows import BoxConfig
 from jeat_graph.road.boxes_road import SizedVehicle, follow_boxes
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.causal import RoadFilter, RoadFilterConfig
+from jeat_graph.road.causal import RoadFilter
 from jeat_graph.road.cuboid_fit import CuboidConfig
 from jeat_graph.road.lag_table import RoadLagTable, lagged_pieces
 from jeat_graph.road.results import empty_road_columns, road_columns
-from jeat_graph.road.taken_boxes import boxes_of_log, sensor_errors
+from jeat_graph.road.taken_boxes import boxes_of_log
 from jeat_graph.runs.directory import MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED
 
 _STEPS_AT_ONCE = 64
@@ -41,7 +41,7 @@ def write_run_tables(folder: Path, config: Config, camera: RoadCamera) -> None:
     log = log[np.argsort(log["t"], kind="stable")]
     causal = read_trajectories(folder / "causal.csv")
     with TableWriter(folder / ROAD_CAUSAL) as writer:
-        for piece in causal_pieces(log, causal, RoadFilter(camera, config, RoadFilterConfig())):
+        for piece in causal_pieces(log, causal, RoadFilter(camera)):
             writer.append(piece)
     if not (folder / "smoothed.csv").is_file():
         return
@@ -49,11 +49,11 @@ def write_run_tables(folder: Path, config: Config, camera: RoadCamera) -> None:
         instants = np.unique(np.concatenate([log["t"], _instants(log["t"], causal.t)]))
         with TableWriter(folder / ROAD_SMOOTHED) as writer:
             writer.append(empty_road_columns())
-            for piece in lagged_pieces(log, instants, RoadLagTable(camera, config)):
+            for piece in lagged_pieces(log, instants, RoadLagTable(camera, config.smoother.lag_s)):
                 writer.append(piece)
         return
     smoothed = read_trajectories(folder / "smoothed.csv")
-    tracks = boxes_of_log(log, sensor_errors(config), smoothed, camera, BoxConfig())
+    tracks = boxes_of_log(log, smoothed, camera, BoxConfig())
     write_smoothed(follow_boxes(tracks, camera, CuboidConfig(), smoother=config.smoother.road), folder)
 
 

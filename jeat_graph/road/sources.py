@@ -18,7 +18,7 @@ from jeat_graph.road.box_rows import BoxConfig
 from jeat_graph.road.boxes_road import TrackBoxes, boxes_of_table
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.inputs import PointTable, read_points_table
-from jeat_graph.road.taken_boxes import boxes_of_log, sensor_errors
+from jeat_graph.road.taken_boxes import boxes_of_log
 from jeat_graph.runs.directory import RUN_JSON
 from jeat_graph.runs.measured import measurement_rows
 
@@ -91,11 +91,11 @@ def boxes_of(
     if not (Path(source) / RUN_JSON).is_file():
         return boxes_of_table(table, camera, config)
     try:
-        log, settings = measurement_rows(Path(source), progress=progress)
+        log, _ = measurement_rows(Path(source), progress=progress)
     except JeatGraphError as error:
         say(f"{error}; the table's smoothed boxes are used instead, which are less sure")
         return boxes_of_table(table, camera, config)
-    return boxes_of_log(log, sensor_errors(settings), table, camera, config)
+    return boxes_of_log(log, table, camera, config)
 
 
 def recording_span_of(source: str | Path, **options: Unpack[ReadingOptions]) -> tuple[float, float]:

@@ -8,27 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, RecordArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.road.box_rows import BoxConfig, SensorErrors, rows_of_log
+from jeat_graph.road.box_rows import BoxConfig, rows_of_log
 from jeat_graph.road.boxes_road import TrackBoxes, each_track
 from jeat_graph.road.camera import RoadCamera
 
-# Of the variance of real detectors' boxes about half persists for half a second to a second (s).
-_LASTING_SHARE, _MEMORY_S = 0.5, 0.7
 _SAME_TRACK = 0.5  # share of a fragment's detections that lie on a track for it to be a part of it
 _FEW = 3  # fewer detections in a row that lie beside their track's boxes are errors, not another's
 
 
-def sensor_errors(config: Config) -> SensorErrors:
-    """Memory of the errors of a configuration's sensors, in the order of their names."""
-    count = len(config.sensor_names)
-    return SensorErrors(np.full(count, _MEMORY_S), np.full(count, _LASTING_SHARE))
-
-
 def boxes_of_log(
-    log: RecordArray, errors: SensorErrors, table: Trajectories, camera: RoadCamera, config: BoxConfig
+    log: RecordArray, table: Trajectories, camera: RoadCamera, config: BoxConfig
 ) -> list[TrackBoxes]:
     """Give each track of a table the detections that it took in.
 
@@ -36,6 +27,7 @@ def boxes_of_log(
     were exchanged in hindsight each has what the other took in from then on. So detections of another
     identity belong to the track on whose boxes they lie, at times at which the track has none of its own.
     """
+    sensors = int(log["sensor"].max(initial=-1)) + 1
     log = log[np.argsort(log["track_id"], kind="stable")]
     pieces = np.split(log, np.flatnonzero(np.diff(log["track_id"])) + 1) if len(log) else []
     tracks = {int(one.track_id[0]): one for one in each_track(table)}
@@ -57,7 +49,7 @@ def boxes_of_log(
         if own[k]:
             taken = np.concatenate(own[k])
             taken = taken[np.argsort(taken["t"], kind="stable")]
-            boxes = rows_of_log(taken, errors, (camera.width, camera.height), config)
+            boxes = rows_of_log(taken, sensors, (camera.width, camera.height), config)
             found.append(TrackBoxes(k, one.t, boxes))
     return found
 

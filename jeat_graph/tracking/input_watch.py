@@ -149,7 +149,8 @@ class InputWatch:
     def _judge_step(self, sensor: str, times: FloatArray) -> None:
         step = float(np.median(np.diff(times)))
         declared = self._config.sensors.get(sensor)
-        if step < LONGEST_STEP_S or declared is None or declared.rate_hz * step < 2.0:
+        known_slow = declared is not None and declared.rate_hz * step < 2.0
+        if step < LONGEST_STEP_S or known_slow:
             return
         unit = likely_unit(step)
         guess = "are the times in s?"

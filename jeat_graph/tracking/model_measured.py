@@ -85,21 +85,20 @@ def records_of(
     nis, scale, _ = fit
     rows = np.zeros(len(takers), dtype=MEASUREMENT)
     size = told.boxes[:, 2:]
-    side = np.array(
-        [
-            box_sides.side_variance(one[None], math.log(s * c.side_std**2), c)[0]
-            for one, s in zip(size, scale.tolist(), strict=True)
-        ]
-    ).reshape(-1, 2)
+    # What is in proportion to ρ² is the sensor's own, and of that a part lasts (`singer.lasting_error`).
+    of_size = box_sides.side_variance(size, 0.0, c) - c.pixel_std**2
+    own = (c.side_std**2 * scale)[:, None] * of_size
+    side, lasting = own + c.pixel_std**2, c.error_share * own
     whole, born = np.sqrt(size.prod(axis=1)), np.isnan(nis)
     rows["t"], rows["track_id"], rows["sensor"], rows["birth"] = told.t, takers, told.sensor, born
     rows["z"] = told.boxes[:, :2] + size / 2.0
     # The centre is the mean of two sides, the size their difference.
     rows["r"] = rows["noise"] = side / 2.0
+    rows["coloured_std"] = np.sqrt(lasting / 2.0)
     rows["error"] = _NO_ERROR
     rows["jerk"] = np.exp(q.jerk / 2.0) * whole
     rows["size_density"] = math.exp(q.growth / 2.0)
-    rows["log_size"], rows["size_var"] = np.log(size), 2.0 * side / size**2
+    rows["log_size"], rows["size_var"] = np.log(size), 2.0 * (side + lasting) / size**2
     if born.any():
         corners = np.concatenate([told.boxes[:, :2], told.boxes[:, :2] + size], axis=1)
         whole = np.zeros((int(born.sum()), 2, 2), dtype=np.bool_)

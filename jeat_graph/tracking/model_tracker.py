@@ -309,8 +309,9 @@ class ModelTracker(Updates, SavedModel):
         if now is not None and t < now:
             raise TimeOrderError(f"t = {t} s is before the last scan at {now} s: that is past")
         rows = with_classes(self._model.rows(), self._classes, self._called)
-        q = singer.ProcessNoise(*self._model.learnt()["process_noise"])
-        rows, covariance = predicted(rows, self._model.covariances(), t, q, self.constants)
+        learnt = self._model.learnt()
+        noise = singer.ProcessNoise(*learnt["process_noise"]), float(learnt["log_scene_variance"])
+        rows, covariance = predicted(rows, self._model.states(), t, noise, self.constants)
         there = still_there(rows, self._model.picture())
         table = self._table(rows).take(there)
         return Prediction(**vars(table), cov=of_motion(covariance[there]))

@@ -27,36 +27,36 @@ class Prediction(Trajectories):
 
 
 def predicted(
-    rows: ModelRows, covariances: FloatArray, t: float, q: singer.ProcessNoise, c: ModelConstants
+    rows: ModelRows,
+    states: tuple[FloatArray, FloatArray],
+    t: float,
+    noise: tuple[singer.ProcessNoise, float],
+    c: ModelConstants,
 ) -> tuple[ModelRows, FloatArray]:
     """Predict rows of one time to another, by the filter's own model of motion.
 
     Args:
         rows: the tracks (N,) now.
-        covariances: (N, 50) of these.
+        states: their means (N, 14) and covariances (N, 98).
         t: time (s), not before theirs.
-        q: process noise of the scene.
+        noise: process noise of the scene, and ln ρ² of its boxes.
         c: constants.
 
     Returns:
-        The rows then, which no sensor has seen, and the covariances (N, 2, 5, 5).
+        The rows then, which no sensor has seen, and the covariances (N, 2, 5, 5) of the motion.
     """
-    shape = (len(rows[0]), 2, singer.MOTION)
-    mean, covariance = rows[2].reshape(shape), covariances.reshape(*shape, singer.MOTION)
+    shape = (len(rows[0]), 2, singer.STATES)
+    mean, covariance = states[0].reshape(shape), states[1].reshape(*shape, singer.STATES)
     dt = float(t - rows[0][0]) if len(rows[0]) else 0.0
     if dt > 0.0:
         model = singer.discretise(dt, c)
-        # Errors of detectors move nothing: any will do.
-        error = singer.STATES - singer.MOTION
-        whole = np.pad(mean, ((0, 0), (0, 0), (0, error)))
-        spread = np.pad(covariance, ((0, 0), (0, 0), (0, error), (0, error)))
-        F = singer.in_perspective(model.F, whole, dt, c)
-        whole, spread = singer.predict(whole, spread, model, F, q, 0.0, c)
-        mean, covariance = whole[..., : singer.MOTION], spread[..., : singer.MOTION, : singer.MOTION]
-    variance = np.diagonal(covariance, axis1=2, axis2=3).reshape(-1, 2 * singer.MOTION)
-    flat = mean.reshape(-1, 2 * singer.MOTION)
+        F = singer.in_perspective(model.F, mean, dt, c)
+        mean, covariance = singer.predict(mean, covariance, model, F, *noise, c)
+    motion = covariance[..., : singer.MOTION, : singer.MOTION]
+    variance = np.diagonal(motion, axis1=2, axis2=3).reshape(-1, 2 * singer.MOTION)
+    flat = singer.told_motion(mean).reshape(-1, 2 * singer.MOTION)
     _, ids, _, _, real, used, label, share = rows
-    return (np.full(len(mean), t), ids, flat, variance, real, 0 * used, label, share), covariance
+    return (np.full(len(mean), t), ids, flat, variance, real, 0 * used, label, share), motion
 
 
 def still_there(rows: ModelRows, picture: tuple[float, float]) -> FloatArray:

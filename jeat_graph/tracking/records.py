@@ -21,6 +21,10 @@ from jeat_graph.tracking.measured import ConfirmedMeasurements
 from jeat_graph.tracking.model_tracker import PendingStep
 from jeat_graph.tracking.tracker import Tracker
 
+_MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
+# Place, velocity and acceleration as tables tell them (`singer.told_motion`).
+_OUTPUT = np.stack([singer.told_motion(np.eye(singer.STATES))[:, k] for k in _MOTION])
+
 
 def record_tracks(
     config: Config, detections: Detections, *, progress: bool = False
@@ -57,7 +61,8 @@ def record_tracks(
     found = tracks_of(records, times, [number[sensor] for sensor in sensors])
     reported = set(causal.track_id.tolist())
     whole = [one for one in found if one.track_id in reported]
-    return [replace(one, F=_transitions(one, tracker.constants)) for one in whole], causal
+    F = [_transitions(one, tracker.constants) for one in whole]
+    return [replace(one, F=steps, output=_OUTPUT) for one, steps in zip(whole, F, strict=True)], causal
 
 
 def record_measurements(

@@ -12,7 +12,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters import gap_survival, sensor_offsets
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.filters.singer import MOTION
+from jeat_graph.filters.singer import MOTION, STATES, told_motion
 from jeat_graph.smoothers.state_rts import FilterRecord, smooth
 from jeat_graph.tracking.reference import step
 from jeat_graph.tracking.reference_life import begin_anew
@@ -61,7 +61,7 @@ class Answer(NamedTuple):
     """What the last step told; see the methods of `ReferenceModel`."""
 
     rows: ModelRows
-    covariances: FloatArray
+    states: tuple[FloatArray, FloatArray]
     takers: IntArray
     living: IntArray
     fit: tuple[FloatArray, FloatArray, FloatArray]
@@ -146,7 +146,7 @@ class ReferenceModel:
         nothing = np.zeros(0)
         self._answer = Answer(
             _rows(t, told.track_id, told.mean, told.covariance, told.real, told.used),
-            told.covariance[..., :MOTION, :MOTION].reshape(-1, MOTION * _WIDTH),
+            (told.mean.reshape(-1, 2 * STATES), told.covariance.reshape(-1, 2 * STATES**2)),
             np.concatenate([*done.takers, np.zeros(0, np.int64)]),
             tracks.track_id,
             (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
@@ -205,9 +205,9 @@ class ReferenceModel:
         """Return the tracks that the last step reports."""
         return self._answer.rows
 
-    def covariances(self) -> FloatArray:
-        """Return the covariances (N, 50) of these: two axes of 5 x 5."""
-        return self._answer.covariances
+    def states(self) -> tuple[FloatArray, FloatArray]:
+        """Return their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7."""
+        return self._answer.states
 
     def takers(self) -> IntArray:
         """Return the identity of the track (M,) that took each box of the last step."""
@@ -324,6 +324,7 @@ class ReferenceModel:
         return {
             **state.sensors._asdict(),
             "log_side_variance": state.log_side_variance,
+            "log_scene_variance": state.log_scene_variance if state.t is not None else 0.0,
             "leftovers": state.leftovers,
             "false_boxes": state.false_boxes,
             "offsets": sensor_offsets.offsets(state.offsets, state.log_side_variance, self.constants),
@@ -344,7 +345,7 @@ def _rows(
 ) -> ModelRows:
     """Return tracks (N,) at one time."""
     variance = np.diagonal(covariance, axis1=2, axis2=3)
-    flat = mean[..., :MOTION].reshape(-1, _WIDTH), variance[..., :MOTION].reshape(-1, _WIDTH)
+    flat = told_motion(mean).reshape(-1, _WIDTH), variance[..., :MOTION].reshape(-1, _WIDTH)
     if called is None:
         called = [Called(track, -1, 0.0) for track in ids.tolist()]
     given, label = (np.array([one[k] for one in called], dtype=np.int64) for k in (0, 1))

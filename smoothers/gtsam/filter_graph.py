@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.filtered_track import MOTION, FilteredTrack
+from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 __all__ = ["FilterGraph", "filter_graph"]
 
@@ -47,12 +47,14 @@ class FilterGraph:
         values: `gtsam.Values`: the filter's states.
         times_s: (K,) of each track's states, by its number.
         size: components of a state per axis.
+        tracks: that it is of, by number.
     """
 
     graph: Any
     values: Any
     times_s: Mapping[int, FloatArray]
     size: int
+    tracks: Mapping[int, FilteredTrack]
 
     def key(self, track: int, state: int) -> int:
         """Return GTSAM's key of a state.
@@ -90,7 +92,7 @@ class FilterGraph:
     def motion(self, values: Any, track: int) -> FloatArray:
         """Return a track's motion (K, 2, 3) in some values: place, velocity, acceleration per axis."""
         states = np.stack([values.atVector(_key(track, k)) for k in range(len(self.times_s[track]))])
-        return np.asarray(states.reshape(-1, 2, self.size)[:, :, :MOTION])
+        return self.tracks[track].motion(states.reshape(-1, 2, self.size))
 
 
 def filter_graph(tracks: Sequence[FilteredTrack]) -> FilterGraph:
@@ -103,7 +105,8 @@ def filter_graph(tracks: Sequence[FilteredTrack]) -> FilterGraph:
         states = _state_of_record(track)
         _add(graph, values, track, states)
         times[track.track_id] = track.t[np.flatnonzero(np.diff(states, prepend=-1))]
-    return FilterGraph(graph, values, times, tracks[0].mean.shape[2])
+    by_number = {track.track_id: track for track in tracks}
+    return FilterGraph(graph, values, times, tracks[0].mean.shape[2], by_number)
 
 
 def _key(track: int, state: int) -> int:

@@ -11,8 +11,6 @@ import pytest
 
 from benchmarks.__main__ import build_parser, main
 from benchmarks.recordings import simulated
-from jeat_graph.config.reading import load_config
-from jeat_graph.io.config_io import save_config
 from jeat_graph.io.detections_io import write_detections
 from jeat_graph.io.truth_io import write_truth
 
@@ -83,16 +81,6 @@ def test_recordings_that_were_in_view_are_counted(tmp_path):
     assert _set_row(one | {"sensors": ["rgb"]})["in view"] == "1 of 2"
 
 
-def test_a_configuration_chosen_without_a_set_has_a_row_in_that_set_alone(data, tmp_path):
-    held_out = tmp_path / "without-first.yaml"
-    save_config(load_config("default", ["tracker.engine=core"]), held_out)
-    argument = ["--left-out", f"first={held_out}"]
-    assert main(["mot", str(data), *FEW, "--quick", *argument, "--out", str(tmp_path)]) == 0
-    records = json.loads((tmp_path / "mot.json").read_text())["records"]
-    rows = {e["set"] for e in records if e["row"] == "without-first, chosen without this set"}
-    assert rows == {"first"}
-
-
 def test_simulated_worlds_are_judged_by_the_same_rows(tmp_path):
     words = ["simulated", "--worlds", "day", "square", "no light", "--seeds", "3", "--duration", "1"]
     assert main([*words, *FEW, "--out", str(tmp_path), "--page", str(tmp_path / "page.md")]) == 0
@@ -105,7 +93,6 @@ def test_simulated_worlds_are_judged_by_the_same_rows(tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["mot", "{data}", "--left-out", "third=x.yaml"], "one of the sets first, second"),
         (["mot", "{data}", "--detections", "yolox=nowhere"], "nowhere is no folder"),
         (["mot", "{data}", "--set", "no.such=1"], "no"),
         (["mot", "nowhere"], "nowhere: is no folder"),

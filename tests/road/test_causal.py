@@ -13,9 +13,9 @@ from road_scenes import HEIGHT, WIDTH, camera
 from scipy.linalg import expm
 
 from jeat_graph.cli.main import main
-from jeat_graph.config.reading import load_config
 from jeat_graph.core import road as core
 from jeat_graph.filters.measurement import MEASUREMENT
+from jeat_graph.road.box_rows import LASTING_SHARE
 from jeat_graph.road.causal import CalibrationShare, RoadFilter, RoadFilterConfig
 from jeat_graph.road.cuboid import sides
 from jeat_graph.road.road_state import AY, STATES, VX, VY, X, Y
@@ -90,7 +90,7 @@ def _log(rng: np.random.Generator, noise: float, number: int = 1, speed: float =
 
 
 def _follow(rows: np.ndarray) -> list[tuple[float, float, float, float]]:
-    road, found = RoadFilter(camera(), load_config("highway")), []
+    road, found = RoadFilter(camera()), []
     for k in range(len(rows)):
         states = road.step(float(rows["t"][k]), rows[k : k + 1], np.array([rows["track_id"][k]]))
         columns = road.columns([states])
@@ -120,6 +120,15 @@ def test_a_speed_is_stated_once_it_is_known() -> None:
     assert np.isnan(found[~known, 2]).all()
     assert np.sqrt(found[known, 2].max()) <= RoadFilterConfig().known_kmh
     assert np.abs(found[known, 1] - 79.2).max() < 3.0 * RoadFilterConfig().known_kmh
+
+
+def test_sensors_need_not_be_known_beforehand_and_their_noise_is_taken_as_it_is_recorded() -> None:
+    """The number of a sensor is nothing to the road, and `scale` is in the variances already."""
+    rows = _log(np.random.default_rng(5), 0.7)
+    last, scaled = rows.copy(), rows.copy()
+    last["sensor"], scaled["scale"] = 62, 0.2
+    for other in (last, scaled):
+        np.testing.assert_array_equal(_follow(rows), _follow(other))
 
 
 def test_what_the_table_says_of_a_state_is_its_transform() -> None:
@@ -172,7 +181,7 @@ def test_a_box_behind_the_camera_leaves_the_state_as_it_was() -> None:
 def test_a_track_without_a_box_is_forgotten_and_begins_anew() -> None:
     rows = _log(np.random.default_rng(10), 0.3)
     config = RoadFilterConfig(silence_s=0.5)
-    road = RoadFilter(camera(), load_config("highway"), config)
+    road = RoadFilter(camera(), config)
     first = road.step(0.0, rows[:1], np.array([1]))
     assert len(first) == 1
     for k in range(1, 512):  # at the last of them it looks for such tracks, but it is not time yet
@@ -185,30 +194,33 @@ def test_a_track_without_a_box_is_forgotten_and_begins_anew() -> None:
 
 
 def test_boxes_that_come_at_once_tell_nothing_new() -> None:
-    """Leaving out those within a share of their errors' memory changes little."""
+    """Leaving out those within a share of their errors' memory changes little where these last."""
     rows = _log(np.random.default_rng(7), 0.7)
-    config = load_config("highway")
+    lasting = LASTING_SHARE * rows["r"]
+    rows["coloured_std"], rows["r"] = np.sqrt(lasting), rows["r"] - lasting
     final = {}
-    for pause in (0.0, 0.15):
-        road = RoadFilter(camera(), config, RoadFilterConfig(pause=pause))
+    for pause in (0.0, RoadFilterConfig().pause):
+        road = RoadFilter(camera(), RoadFilterConfig(pause=pause))
         for k in range(len(rows)):
             states = road.step(float(rows["t"][k]), rows[k : k + 1], rows["track_id"][k : k + 1])
         final[pause] = states[0]
     spread = np.sqrt(final[0.0]["var"])
-    assert (np.abs(final[0.15]["mean"] - final[0.0]["mean"]) < spread).all()
-    np.testing.assert_allclose(np.sqrt(final[0.15]["var"]), spread, rtol=0.2)
+    off = final[RoadFilterConfig().pause]["mean"] - final[0.0]["mean"]
+    off[3] = (off[3] + np.pi) % (2.0 * np.pi) - np.pi  # the heading
+    assert (np.abs(off) < spread).all()
+    np.testing.assert_allclose(np.sqrt(final[RoadFilterConfig().pause]["var"]), spread, rtol=0.2)
 
 
 def test_tracks_are_kept_in_order_whenever_they_begin() -> None:
     """A track that is older than others but stands on the road later than they."""
-    road = RoadFilter(camera(), load_config("highway"))
+    road = RoadFilter(camera())
     logs = {n: _log(np.random.default_rng(n), 0.3, number=n) for n in (2, 7, 5)}
     for k in range(2, 40):
         rows = np.concatenate([logs[n][k : k + 1] for n in (2, 7, 5) if k >= n])
         ids = np.array([9, 7, 2, 5])
         states = road.step(0.02 * k, rows, ids)
     assert states["track_id"].tolist() == [7, 2, 5]
-    alone = RoadFilter(camera(), load_config("highway"))
+    alone = RoadFilter(camera())
     for k in range(5, 40):
         one = alone.step(0.02 * k, logs[5][k : k + 1], np.array([5]))
     assert one[0]["mean"].tobytes() == states[2]["mean"].tobytes()
@@ -232,7 +244,7 @@ def test_stated_errors_are_about_what_they_are() -> None:
 def test_a_vehicle_cut_off_by_the_edge_has_no_state_yet() -> None:
     rows = _log(np.random.default_rng(4), 0.3)[:1]
     rows["z"][0, 1] = HEIGHT - np.exp(rows["log_size"][0, 1]) / 2.0
-    road = RoadFilter(camera(), load_config("highway"))
+    road = RoadFilter(camera())
     assert not len(road.step(0.0, rows, np.array([1])))
 
 
@@ -252,7 +264,7 @@ def test_calibration_share_is_that_of_the_place() -> None:
 def test_track_with_a_camera_writes_the_tables_of_the_road(tmp_path: Path) -> None:
     sim, run = tmp_path / "sim", tmp_path / "run"
     assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "2.5", "--seed", "2"]) == 0
-    track = ["track", str(sim / "detections.csv"), "--config", "highway", "--out", str(run)]
+    track = ["track", str(sim / "detections.csv"), "--out", str(run)]
     assert main([*track, "--camera", str(sim / "camera.yaml")]) == 0
     tables = {}
     for kind in ("causal", "smoothed"):

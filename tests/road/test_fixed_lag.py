@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from road_scenes import camera
 
-from jeat_graph.config.reading import load_config
 from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.road.box_rows import BoxConfig, rows_of_log
 from jeat_graph.road.boxes_road import BOX_MOTION
@@ -14,7 +13,6 @@ from jeat_graph.road.cuboid import sides
 from jeat_graph.road.cuboid_fit import CuboidConfig
 from jeat_graph.road.fixed_lag import RoadFixedLag, RoadLagConfig
 from jeat_graph.road.graph_fit import GraphConfig, fit_graph
-from jeat_graph.road.taken_boxes import sensor_errors
 
 SIZE = np.array([4.4, 1.8, 1.5])
 PX = 0.5
@@ -36,7 +34,7 @@ def _log(seed: int, identity: int = 1, start: float = 0.0, speed: float = -14.0)
 
 def _follow(log: np.ndarray, config: RoadLagConfig) -> tuple[list[np.ndarray], np.ndarray]:
     """Records by step, and those of the end."""
-    smoother = RoadFixedLag(camera(), load_config("highway"), config)
+    smoother = RoadFixedLag(camera(), config)
     log = log[np.argsort(log["t"], kind="stable")]
     parts = np.split(log, np.flatnonzero(np.diff(log["t"])) + 1)
     return [smoother.step(float(part["t"][0]), part) for part in parts], smoother.finish()
@@ -45,8 +43,7 @@ def _follow(log: np.ndarray, config: RoadLagConfig) -> tuple[list[np.ndarray], n
 def test_with_all_boxes_in_the_window_it_is_the_whole_track_s_fit() -> None:
     log = _log(0)
     _, end = _follow(log, RoadLagConfig(lag_s=100.0, key_s=0.25, chunk_s=50.0, steps=8))
-    errors = sensor_errors(load_config("highway"))
-    rows = rows_of_log(log, errors, (camera().width, camera().height), BoxConfig())
+    rows = rows_of_log(log, 1, (camera().width, camera().height), BoxConfig())
     whole = fit_graph(rows, camera(), CuboidConfig(), BOX_MOTION, GraphConfig(key_s=0.25))
     assert whole is not None
     deviation = np.sqrt(end["var"])
@@ -112,7 +109,7 @@ def test_errors_are_what_they_are_said_to_be() -> None:
 
 
 def test_a_vehicle_that_leaves_the_view_is_forgotten_with_its_boxes() -> None:
-    smoother = RoadFixedLag(camera(), load_config("highway"))
+    smoother = RoadFixedLag(camera())
     log = _log(6)
     for row in log:
         smoother.step(float(row["t"]), np.array([row]))
@@ -125,7 +122,7 @@ def test_a_second_sensor_at_the_time_of_the_last_state_is_taken_in_too() -> None
     """Two messages of one time are two steps, of which the first may have made a state of that time."""
     log = _log(4)
     steps, end = _follow(log, RoadLagConfig())
-    twice = RoadFixedLag(camera(), load_config("highway"), RoadLagConfig())
+    twice = RoadFixedLag(camera())
     found = []
     for k in range(len(log)):
         for part in (log[k : k + 1], log[k : k + 1]):
@@ -146,9 +143,33 @@ def test_what_never_makes_a_vehicle_is_not_kept_for_ever() -> None:
     rows["t"], rows["track_id"], rows["scale"] = t, 1, 1.0
     rows["z"], rows["log_size"] = (640.0, -150.0), np.log((80.0, 15.0))
     rows["r"], rows["size_var"] = 1.0, 1e-3
-    smoother = RoadFixedLag(camera(), load_config("highway"), RoadLagConfig(begin_s=5.0))
+    smoother = RoadFixedLag(camera(), RoadLagConfig(begin_s=5.0))
     for k in range(len(rows)):
         assert not len(smoother.step(float(t[k]), rows[k : k + 1]))
     (track,) = smoother._tracks.values()
     assert track.window is None
     assert 95 <= sum(len(part) for part in track.waiting) <= 101
+
+
+def _seen_by_two(log: np.ndarray, since_s: float) -> np.ndarray:
+    """The same drive, every other box of another sensor from some time on."""
+    log = log.copy()
+    log["sensor"] = (log["t"] > since_s) & (np.arange(len(log)) % 2 == 1)
+    log["coloured_std"] = PX / 2.0
+    return log
+
+
+def test_a_sensor_that_comes_later_is_one_that_has_told_nothing_so_far() -> None:
+    """As if it had been known from the beginning, here by a box of another track."""
+    log = _seen_by_two(_log(8), 1.6)
+    other = _log(9, identity=2)[:1]
+    other["sensor"] = 1
+    steps, end = _follow(log, RoadLagConfig())
+    known, known_end = _follow(np.concatenate([other, log]), RoadLagConfig())
+    found, expected = np.concatenate([*steps, end]), np.concatenate([*known, known_end])
+    expected = expected[expected["track_id"] == 1]
+    assert len(found) > 8
+    np.testing.assert_array_equal(found["t"], expected["t"])
+    deviation = np.sqrt(expected["var"])
+    assert (np.abs(found["mean"] - expected["mean"]) < 0.01 * deviation).all()
+    np.testing.assert_allclose(found["var"], expected["var"], rtol=1e-3)

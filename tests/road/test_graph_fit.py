@@ -197,7 +197,7 @@ def test_the_commands_offer_both(tmp_path: Path) -> None:
     sim, run, found = tmp_path / "sim", tmp_path / "run", {}
     assert main(["simulate", "day-sparse", "--out", str(sim), "--duration", "1.5", "--seed", "2"]) == 0
     camera_file = ["--camera", str(sim / "camera.yaml")]
-    track = ["track", str(sim / "detections.csv"), "--config", "highway", "--out", str(run), *camera_file]
+    track = ["track", str(sim / "detections.csv"), "--out", str(run), *camera_file]
     assert main([*track, "--set", "smoother.road=graph"]) == 0
     for name in ("spline", "graph"):
         out = tmp_path / name

@@ -21,7 +21,7 @@ from jeat_graph.road.fixed_lag import RoadFixedLag, RoadLagConfig
 from jeat_graph.road.lag_table import RoadFile
 from jeat_graph.road.results import empty_road_columns
 
-LAG_S = 0.75
+LAG_S, IMAGE = 0.75, "1280x720"
 SETTINGS = (f"smoother.lag_s={LAG_S}",)
 COLUMNS = ("t", "x", "y", "speed_kmh", "length", "var_x", "var_y", "var_speed_kmh")
 
@@ -36,9 +36,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def expected(scene: Path) -> dict[tuple[int, float], list[float]]:
     """What the class gives, fed step by step, of tracks that were reported by then."""
-    config = load_config("highway", SETTINGS)
-    tracker, reported = Tracker(config, diagnostics=True), set()
-    behind = RoadFixedLag(read_camera(scene / "camera.yaml"), config, RoadLagConfig(lag_s=LAG_S))
+    config = load_config("default", SETTINGS)
+    tracker, reported = Tracker(config, image=IMAGE, diagnostics=True), set()
+    behind = RoadFixedLag(read_camera(scene / "camera.yaml"), RoadLagConfig(lag_s=LAG_S))
     found = []
     for batch in read_detections(scene / "detections.csv").batches():
         reported.update(tracker.step(batch).track_id.tolist())
@@ -70,7 +70,7 @@ def _stream(scene: Path, monkeypatch: pytest.MonkeyPatch, *more: str) -> int:
         lines.append(json.dumps(scans) + "\n")
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO("".join(lines).encode())))
     settings = [part for one in SETTINGS for part in ("--set", one)]
-    return main(["stream", "--config", "highway", *settings, *more])
+    return main(["stream", "--image", IMAGE, *settings, *more])
 
 
 def test_a_stream_writes_what_the_class_gives(
@@ -92,7 +92,7 @@ def test_a_run_writes_the_same(
     scene: Path, expected: dict[tuple[int, float], list[float]], tmp_path: Path
 ) -> None:
     settings = [part for one in (*SETTINGS, "smoother.road=fixed-lag") for part in ("--set", one)]
-    given = [str(scene / "detections.csv"), "--config", "highway", *settings]
+    given = [str(scene / "detections.csv"), "--image", IMAGE, *settings]
     assert main(["track", *given, "--camera", str(scene / "camera.yaml"), "--out", str(tmp_path)]) == 0
     found = _rows(tmp_path / "road_smoothed.csv")
     # Of a recording it is known from the beginning which tracks were to be reported.

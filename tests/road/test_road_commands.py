@@ -113,7 +113,7 @@ def test_a_run_without_a_log_of_its_detections_has_places_by_its_table(
     (tmp_path / "detections.csv").write_text("\n".join(lines) + "\n")
     write_camera(camera(), tmp_path / "camera.yaml")
     run, out = tmp_path / "run", tmp_path / "out"
-    track = ["track", str(tmp_path / "detections.csv"), "--config", "core", "--image", f"{WIDTH}x{HEIGHT}"]
+    track = ["track", str(tmp_path / "detections.csv"), "--config", "paper", "--image", f"{WIDTH}x{HEIGHT}"]
     assert main([*track, "--out", str(run)]) == 0
     capsys.readouterr()
     assert main(["road", str(run), "--camera", str(tmp_path / "camera.yaml"), "--out", str(out)]) == 0

@@ -7,7 +7,7 @@ import pytest
 
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.road.box_rows import BoxConfig, SensorErrors
+from jeat_graph.road.box_rows import BoxConfig
 from jeat_graph.road.taken_boxes import boxes_of_log
 
 from .scenes import camera
@@ -15,7 +15,6 @@ from .scenes import camera
 T = np.arange(0.0, 6.0, 0.1)
 RIGHT, LEFT = 200.0 + 60.0 * T, 560.0 - 60.0 * T
 SIZE = np.array([40.0, 30.0])
-ERRORS = SensorErrors(np.array([1.0]), np.array([0.0]))
 
 
 def log_of(*tracks):
@@ -41,7 +40,7 @@ def table_of(*tracks):
 
 def taken(log, table):
     """Middles (M,) of what each track took in, by identity and in order of time."""
-    found = boxes_of_log(log, ERRORS, table, camera(), BoxConfig(bin_s=1e-3))
+    found = boxes_of_log(log, table, camera(), BoxConfig(bin_s=1e-3))
     return {one.track_id: (one.rows.t, one.rows.z[:, 0]) for one in found}
 
 

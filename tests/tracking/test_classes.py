@@ -36,7 +36,7 @@ def recording(named: bool = True, steps: int = 60, seed: int = 3) -> Detections:
 
 
 def config(engine: str = "none"):
-    return load_config("default", [f"smoother.engine={engine}", "smoother.lag_s=0.5", "smoother.chunk=4"])
+    return load_config("default", [f"smoother.engine={engine}", "smoother.lag_s=0.5"])
 
 
 def said_of(detections: Detections) -> list[tuple[float, int, str, float]]:

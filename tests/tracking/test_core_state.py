@@ -67,7 +67,7 @@ def bytes_of(table):
 
 
 def tracker_with(smoother, **more):
-    return Tracker(load_config("core", _SMOOTHERS[smoother]), image=_SIZE, **more)
+    return Tracker(load_config("default", _SMOOTHERS[smoother]), image=_SIZE, **more)
 
 
 def answers(tracker, scans, drains):
@@ -134,7 +134,7 @@ def _as_scan(scan):
 
 def test_the_reference_goes_back_too_and_says_that_it_is_not_saved(tmp_path):
     scans = list(traffic(times=20))
-    straight, tracker = (Tracker("core", engine="reference", image=_SIZE) for _ in range(2))
+    straight, tracker = (Tracker("default", engine="reference", image=_SIZE) for _ in range(2))
     for scan in scans[:6]:
         straight.step(scan)
         tracker.step(scan)
@@ -301,7 +301,7 @@ def test_what_no_tracker_has_beside_its_model_is_refused(tmp_path, part, value):
 def test_a_file_of_other_settings_or_of_another_version_is_refused(tmp_path):
     _, path = saved(tmp_path)
     with pytest.raises(JeatGraphError, match="lag_s"):
-        Tracker.load(path, load_config("core", ["smoother.lag_s=2", *_PICTURE]))
+        Tracker.load(path, load_config("default", ["smoother.lag_s=2", *_PICTURE]))
     text, block = read_state_file(path, "state")
     write_state_file(path, text.replace(b'"format": ', b'"format": 9'), block)
     with pytest.raises(JeatGraphError, match="begin anew"):
@@ -310,7 +310,7 @@ def test_a_file_of_other_settings_or_of_another_version_is_refused(tmp_path):
 
 def test_a_state_is_the_same_packed_and_unpacked(tmp_path):
     tracker, _ = saved(tmp_path, classes=True)
-    codecs = _codecs(tracker.config)
+    codecs = _codecs()
     text, block = pack(tracker.state(), codecs)
     assert pack(unpack(text, block, codecs), codecs) == (text, block)
 

@@ -18,7 +18,7 @@ ENGINES = ("core", "reference")
 
 def made(engine="core", *overrides, **more):
     return Tracker(
-        load_config("core", ["smoother.engine=none", *overrides]), image=_SIZE, engine=engine, **more
+        load_config("default", ["smoother.engine=none", *overrides]), image=_SIZE, engine=engine, **more
     )
 
 
@@ -243,7 +243,7 @@ def test_an_event_camera_does_not_speak_against_what_stands_still(engine):
 @pytest.mark.parametrize("said", ["kind: dark", "even_score: 0", "even_score: 2", "even_score: high"])
 def test_what_cannot_be_said_of_a_sensor_is_refused(said):
     with pytest.raises(ConfigError, match=said.split(":")[0]):
-        load_config("core", [f"sensors.cam={{rate_hz: 20, {said}}}"])
+        load_config("default", [f"sensors.cam={{rate_hz: 20, {said}}}"])
 
 
 # What a detector returns.

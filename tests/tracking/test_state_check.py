@@ -118,54 +118,6 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize(("name", "value"), [(name, v) for name, values in WRONG.items() for v in values])
-def test_what_no_track_can_be_is_refused(tracker, tmp_path, name, value):
-    state = tracker.state()
-    array = getattr(state["now"].tracks, name).copy()
-    array[1] = value
-    changed = state["now"].tracks._replace(**{name: array})
-    save_state(tmp_path / "s.npz", tracker.config, state | {"now": state["now"]._replace(tracks=changed)})
-    with pytest.raises(DataError, match=r"s\.npz: is damaged"):
-        Tracker.load(tmp_path / "s.npz")
-
-
-def test_a_negative_variance_and_a_lopsided_covariance_are_refused(tracker, tmp_path):
-    state = tracker.state()
-    for place, factor in (((0, 0, 0, 0), -1.0), ((0, 0, 0, 1), 3.0)):
-        cov = state["now"].tracks.cov.copy()
-        cov[place] *= factor
-        changed = state["now"]._replace(tracks=state["now"].tracks._replace(cov=cov))
-        save_state(tmp_path / "s.npz", tracker.config, state | {"now": changed})
-        with pytest.raises(DataError, match="cov holds what is no covariance"):
-            Tracker.load(tmp_path / "s.npz")
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("p_detect", np.zeros(7)),
-        ("clutter", np.zeros(2, np.int64)),
-        ("blind", np.full(2, 1.5)),
-        ("clutter", np.full(2, np.nan)),
-        ("offsets", np.zeros((2, 2, 5))),
-    ],
-)
-def test_what_no_scene_can_be_is_refused(tracker, tmp_path, name, value):
-    state = tracker.state()
-    changed = state["now"]._replace(scene=state["now"].scene._replace(**{name: value}))
-    save_state(tmp_path / "s.npz", tracker.config, state | {"now": changed})
-    with pytest.raises(DataError, match=rf"is damaged: {name}"):
-        Tracker.load(tmp_path / "s.npz")
-
-
-@pytest.mark.parametrize("t", [float("nan"), float("inf"), "now"])
-def test_a_time_that_is_none_is_refused(tracker, tmp_path, t):
-    state = tracker.state()
-    save_state(tmp_path / "s.npz", tracker.config, state | {"now": state["now"]._replace(t=t)})
-    with pytest.raises(DataError, match="is damaged: the time is"):
-        Tracker.load(tmp_path / "s.npz")
-
-
 @pytest.mark.parametrize("key", ["now", "smoothing", "finished", "diagnostics", "log", "past"])
 def test_a_state_without_a_part_is_refused(tracker, tmp_path, key):
     state = {name: value for name, value in tracker.state().items() if name != key}

@@ -48,8 +48,14 @@ struct Rows {
         share.push_back(called.share);
         real.push_back(probability);
         used.push_back(sensors);
-        for (int axis = 0; axis < 2; ++axis)
-            mean.insert(mean.end(), state + axis * kStates, state + axis * kStates + filters::kMotion);
+        // Told is the box as detectors have it, and how far that may be from the object.
+        for (int axis = 0; axis < 2; ++axis) {
+            const double* const own = state + axis * kStates;
+            mean.insert(mean.end(), own, own + filters::kMotion);
+            double* const told = mean.data() + mean.size() - filters::kMotion;
+            told[filters::kPosition] += own[filters::kPositionError];
+            told[filters::kLogSize] += own[filters::kSizeError];
+        }
         for (int axis = 0; axis < 2; ++axis)
             for (int k = 0; k < filters::kMotion; ++k) variance.push_back(covariance[axis * kMatrix + k * kStates + k]);
     }

@@ -152,7 +152,9 @@ public:
     }
 
     Table rows() const { return table(now_.answer.rows); }
-    Out2<double> covariances() const { return array_of(now_.answer.covariance, 2 * kMotion * kMotion); }
+    std::tuple<Out2<double>, Out2<double>> states() const {
+        return {array_of(now_.answer.mean, kMean), array_of(now_.answer.covariance, kCovariance)};
+    }
     Out<std::int64_t> takers() const { return array_of(now_.answer.takers); }
     Out<std::int64_t> living() const { return array_of(now_.answer.living); }
     std::tuple<Out<double>, Out<double>, Out<double>> fit() const {
@@ -201,6 +203,7 @@ public:
         out["boxes_at_edge"] = array_of(at_edge);
         out["boxes_beyond"] = array_of(beyond);
         out["noise_share"] = state.belief.noise_share;
+        out["log_scene_variance"] = state.started ? state.log_scene_variance() : 0.0;
         out["log_side_variance"] = array_of(state.log_side_variance);
         std::vector<double> offsets;
         for (std::size_t k = 0; k < state.sensors.size(); ++k) {
@@ -236,16 +239,13 @@ private:
         answer.living = tracks.track_id;
         answer.real = tracks.real;
         answer.rows.clear();
-        answer.covariance.clear();
+        answer.mean.clear(), answer.covariance.clear();
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             if (!reported_[i]) continue;
             const double* const covariance = tracks.covariance_of(i);
             answer.rows.add(t, {tracks.track_id[i]}, tracks.mean_of(i), covariance, tracks.real[i], tracks.used[i]);
-            for (int axis = 0; axis < 2; ++axis)
-                for (int k = 0; k < kMotion; ++k) {
-                    const double* const row = covariance + axis * kMatrix + k * kStates;
-                    answer.covariance.insert(answer.covariance.end(), row, row + kMotion);
-                }
+            answer.mean.insert(answer.mean.end(), tracks.mean_of(i), tracks.mean_of(i) + kMean);
+            answer.covariance.insert(answer.covariance.end(), covariance, covariance + kCovariance);
         }
     }
 
@@ -309,7 +309,7 @@ void bind(nb::module_& module) {
         .def("set_state", &Model::set_state, nb::arg("state"),
              "Go on from what state() returned. ValueError: it is not what a model can be in; nothing is changed then.")
         .def("rows", &Model::rows, "Reported tracks: t, identity, mean (N, 10), variance (N, 10), posterior, sensors, class, its share.")
-        .def("covariances", &Model::covariances, "Their covariances (N, 50): two axes of 5 x 5.")
+        .def("states", &Model::states, "Their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7.")
         .def("fit", &Model::fit,
              "Of the boxes of the last step the squared distance of the centre (M,), NaN where it began a track, and\n"
              "the scale of the sensor's noise (M,); the posteriors (N,) of the tracks in living().")

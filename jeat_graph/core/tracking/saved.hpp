@@ -23,7 +23,7 @@ using smoothers::Rows;
 // What the last step gave out.
 struct Answer {
     Rows rows;                                 // of the tracks that are reported
-    std::vector<double> covariance;            // of these
+    std::vector<double> mean, covariance;      // states of these
     std::vector<std::int64_t> takers, living;  // of all boxes; the tracks before any ended
     std::vector<double> real;                  // posteriors of these
     std::vector<double> nis, noise_scale;      // of all boxes
@@ -213,8 +213,8 @@ template <class Visitor> void visit_rows(Visitor& v, const std::string& prefix, 
     v.whole(prefix + "rows", rows);
     v.column(prefix + "t", t, rows, 1);
     v.column(prefix + "track_id", track_id, rows, 1);
-    v.column(prefix + "mean", mean, rows, kMean);
-    v.column(prefix + "variance", variance, rows, kMean);
+    v.column(prefix + "mean", mean, rows, 2 * kMotion);
+    v.column(prefix + "variance", variance, rows, 2 * kMotion);
     v.column(prefix + "real", real, rows, 1);
     v.column(prefix + "used", used, rows, 1);
     v.column(prefix + "label", label, rows, 1);
@@ -222,11 +222,12 @@ template <class Visitor> void visit_rows(Visitor& v, const std::string& prefix, 
 }
 
 template <class Visitor> void visit_answer(Visitor& v, Answer& answer) {
-    auto& [rows, covariance, takers, living, real, nis, noise_scale] = answer;
+    auto& [rows, mean, covariance, takers, living, real, nis, noise_scale] = answer;
     visit_rows(v, "answer.", rows);
     std::size_t boxes = takers.size(), tracks = living.size();
     v.whole("answer.boxes", boxes);
     v.whole("answer.tracks", tracks);
+    v.column("answer.state", mean, rows.size(), kMean);
     v.column("answer.covariance", covariance, rows.size(), kCovariance);
     v.column("answer.takers", takers, boxes, 1);
     v.column("answer.living", living, tracks, 1);
@@ -359,7 +360,7 @@ inline void check_state(const State& state, const Answer& answer) {
     check_identities("tracks.track_id", state.tracks.track_id, state.next_id);
     check_identities("answer.living", answer.living, state.next_id);
     check_motion("tracks", state.tracks.mean, state.tracks.covariance);
-    check_motion("answer", answer.rows.mean, answer.covariance);
+    check_motion("answer", answer.mean, answer.covariance);
     for (const Evidence* one : {&state.tracks.evidence, &state.ended})
         for (const std::int64_t owner : one->owner)
             StateReader::require(owner >= 0 && static_cast<std::size_t>(owner) < S, "owner", "is no sensor");

@@ -3,6 +3,7 @@
 // Behind each part stands the stage of step.hpp that writes it.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -108,6 +109,14 @@ struct State {
         camera.shift = square(c.camera_shift_std);
         camera.scale = square(c.camera_scale_std);
         belief.noise_share = c.noise_share;
+    }
+
+    // Mean of ln of the variances of sides of the sensors that have looked.
+    double log_scene_variance() const {
+        double sum = 0.0, number = 0.0;
+        for (std::size_t k = 0; k < sensors.size(); ++k)
+            if (!std::isnan(sensors[k].last_look_s)) sum += log_side_variance[k], number += 1.0;
+        return sum / std::max(number, 1.0);
     }
 
     // Whether boxes end at the edge of the picture more often than they reach beyond it.

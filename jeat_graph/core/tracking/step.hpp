@@ -183,7 +183,7 @@ private:
             presence_step_ = presence_transition(static_cast<double>(ticks) / 1e6, c_);
         }
         if (dt <= 0.0) return;
-        const Densities densities(s_.process_noise, scene_side_variance());
+        const Densities densities(s_.process_noise, exp_of(s_.log_scene_variance()));
         Tracks& tracks = s_.tracks;
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, densities, c_);
@@ -386,7 +386,7 @@ private:
                 if (scan.logits[free_[g]] > scan.logits[j])
                     overlap = std::max(overlap, intersection_over_union(boxes_[j], free_boxes_[g]));
             });
-            initial_state(boxes_[j], edges_[j], rho2, scene_side_variance(), c_, tracks.mean_of(row), tracks.covariance_of(row));
+            initial_state(boxes_[j], edges_[j], rho2, exp_of(s_.log_scene_variance()), c_, tracks.mean_of(row), tracks.covariance_of(row));
             tracks.track_id[row] = s_.next_id++;
             tracks.used[row] = std::int64_t{1} << k;
             see_presence(tracks.presence.data() + row * kPresences);
@@ -515,13 +515,6 @@ private:
         return square(m[kVelocity]) + square(m[kStates + kVelocity]) < square(kLeastSpeed);
     }
 
-    // The geometric mean of the variances of sides of the sensors that have looked.
-    double scene_side_variance() const {
-        double sum = 0.0, number = 0.0;
-        for (std::size_t k = 0; k < s_.sensors.size(); ++k)
-            if (!std::isnan(s_.sensors[k].last_look_s)) sum += s_.log_side_variance[k], number += 1.0;
-        return exp_of(sum / std::max(number, 1.0));
-    }
     double unseen_for(std::size_t row) const { return s_.t - s_.tracks.evidence.last_s[row]; }
     double share_inside(std::size_t row) {
         const Sides box = corners(s_.tracks.mean_of(row));
