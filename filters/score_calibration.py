@@ -101,7 +101,9 @@ def half_as_many(counts: RepeatCounts, c: ModelConstants) -> float:
     best = np.cumsum(total[::-1])[::-1] <= c.best_share * total.sum()
     best[-1] = True
     top = (repeated[best].sum() + _BEST_COUNT * c.repeat_share) / (total[best].sum() + _BEST_COUNT)
-    share = (repeated + c.repeat_count * c.repeat_share * top) / (total + c.repeat_count) / top
+    # Poisson counts with a gamma prior: where even the best hardly come again, since all moves far from one
+    # scan to the next, the counts say little.
+    share = (repeated + c.repeat_count * c.repeat_share) / (total * top + c.repeat_count)
     low = np.flatnonzero(share < 0.5)
     return float(SCORE_GRID[low[-1] if len(low) else 0])
 

@@ -142,12 +142,13 @@ def _run(args: argparse.Namespace, cameras: LiveDetecting | None) -> int:
             event=output.event,
             warn=_say,
             smoothed=smoothed,
+            kept=lambda: {"seq": output.seq},
             flush=output.flush,
             commit=(lambda: None) if source is None else source.commit,
             too_large=(lambda: 0) if sink is None else lambda: sink.too_large,
         )
         session = Session(live, ends, args.checkpoint, args.every or _EVERY_S, more)
-        output.seq = more.get("count", 0)
+        output.seq = more.get("kept", {}).get("seq", 0)
         with contextlib.suppress(UnconfirmedError):  # after a signal; the session tells of it
             try:
                 if cameras is not None:
@@ -200,9 +201,12 @@ def _config(args: argparse.Namespace, cameras: LiveDetecting | None) -> Config:
 def _tracker(args: argparse.Namespace, config: Config) -> tuple[LiveTracker, dict[str, Any]]:
     """The tracker, new or from the checkpoint, and what was kept with it."""
     from jeat_graph.data.errors import ConfigError
-    from jeat_graph.live.late import LiveTracker
+    from jeat_graph.live.late import LiveTracker, check_saved
     from jeat_graph.tracking.tracker import Tracker
 
+    tracker = Tracker(config, diagnostics=args.road is not None)
+    if args.checkpoint is not None:
+        check_saved(tracker, "--checkpoint")
     if args.checkpoint is not None and Path(args.checkpoint).is_file():
         live, more = LiveTracker.load(args.checkpoint, config)
         if live.policy != args.late:
@@ -211,7 +215,7 @@ def _tracker(args: argparse.Namespace, config: Config) -> tuple[LiveTracker, dic
                 "begin anew without the file"
             )
         return live, more
-    return LiveTracker(Tracker(config, diagnostics=args.road is not None), args.late), {}
+    return LiveTracker(tracker, args.late), {}
 
 
 def _with_road(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.tracker import Tracker
@@ -45,12 +44,6 @@ class Taken(NamedTuple):
     good: list[Scan]
     dropped: list[Scan]
     late_s: float
-
-
-def most_late_s(config: Config, sensor: str) -> float:
-    """Return how late a sensor's scans may come (s)."""
-    own = config.sensors[sensor].late_s
-    return config.live.late_s if own is None else own
 
 
 def looked_last(tracker: Tracker) -> list[str]:

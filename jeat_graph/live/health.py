@@ -2,8 +2,8 @@
 
 A silent sensor needs no help in the tracker: only a scan that found nothing counts as a miss, and no scan
 says nothing. One that delivers rubbish loses its weight by itself: the running estimates of its clutter and
-of its noise rise, and the probability that what it finds is real falls. What is done here is to notice, and to
-say so: by what is usual of the sensor itself, as a slow mean over the time in which it was well.
+of its noise rise, and the probability that what it finds is real falls. What is done here is to notice, and
+to say so: by what is usual of the sensor itself, as a slow mean over the time in which it was well.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from jeat_graph.config.schema import Config
+from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.detections import Scan
 from jeat_graph.tracking.sensor_state import SensorState
 
@@ -57,7 +57,6 @@ class SensorHealth:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self.know(config)
         self.last: dict[str, float] = {}
         self.silent: list[str] = []
         self.rubbish: list[str] = []
@@ -70,11 +69,7 @@ class SensorHealth:
             A line for each sensor that has not been known before.
         """
         fresh = sorted(config.sensors.keys() - self._config.sensors.keys())
-        self._config, live = config, config.live
-        self._patience_s = {
-            name: max(live.silent_s, live.silent_periods / sensor.rate_hz)
-            for name, sensor in config.sensors.items()
-        }
+        self._config = config
         rates = {name: config.sensors[name].rate_hz for name in fresh}
         return [
             f"sensor {name!r} is not declared: taken for a detector at {hz:g} Hz"
@@ -95,7 +90,7 @@ class SensorHealth:
         for scan in scans:
             self.last[scan.sensor] = max(scan.t, self.last.get(scan.sensor, scan.t))
         for name, t in self.last.items():
-            quiet = now - t > self._patience_s[name]
+            quiet = now - t > self._patience_s(name)
             if quiet and name not in self.silent:
                 self.silent.append(name)
                 text = f"sensor {name!r} has given no scan since t = {t:.6g} s"
@@ -104,6 +99,11 @@ class SensorHealth:
                 self.silent.remove(name)
                 events.append(HealthChange(now, name, BACK, f"sensor {name!r} gives scans again"))
         return events
+
+    def _patience_s(self, sensor: str) -> float:
+        """Return after how long without a scan a sensor counts as silent (s)."""
+        live, said = self._config.live, self._config.sensors.get(sensor, SensorConfig())
+        return max(live.silent_s, live.silent_periods / said.rate_hz)
 
     def jumped(self, now: float) -> None:
         """Note that time goes on elsewhere: no sensor has been silent meanwhile.
@@ -132,9 +132,9 @@ class SensorHealth:
             if worst >= 1.0 and name not in self.rubbish:
                 self.rubbish.append(name)
                 text = (
-                    f"sensor {name!r} delivers rubbish: {state.clutter:.3g} false boxes a scan ({usual[0]:.3g} "
-                    f"usually), noise variance {state.noise_scale / usual[1]:.3g} times as usual, "
-                    f"{100.0 * state.trust:.2g} % of what it finds are real; it weighs less"
+                    f"sensor {name!r} delivers rubbish: {state.clutter:.3g} false boxes a scan "
+                    f"({usual[0]:.3g} usually), noise variance {state.noise_scale / usual[1]:.3g} times as "
+                    f"usual, {100.0 * state.trust:.2g} % of what it finds are real; it weighs less"
                 )
                 events.append(HealthChange(now, name, RUBBISH, text))
             elif worst < AGAIN and name in self.rubbish:

@@ -14,23 +14,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.config.schema import Config
+from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.live.arrival import Arrival, Taken, looked_last, most_late_s
+from jeat_graph.live.arrival import Arrival, Taken, looked_last
 from jeat_graph.live.lateness import LatenessCounter
-from jeat_graph.live.met_sensors import MetSensors
 from jeat_graph.live.repetition import Repetition
-from jeat_graph.live.rewinding import Rewinding, ReplayableStep
+from jeat_graph.live.rewinding import ReplayableStep, Rewinding
 from jeat_graph.live.time_base import Decision, TimeBase
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
-from jeat_graph.tracking.first_sight import ToldSoFar
 from jeat_graph.tracking.model_tracker import PendingStep
-from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
+from jeat_graph.tracking.prediction import Prediction
+from jeat_graph.tracking.scans import ScanLike, as_scans
 from jeat_graph.tracking.tracker import Tracker
 
 REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
@@ -39,7 +38,18 @@ _ROUNDING_S = 1e-6
 POLICIES = (REWIND, SKIP, REFUSE)
 
 
-class LiveTracker(MetSensors):
+def check_saved(tracker: Tracker, what: str) -> None:
+    """Refuse a checkpoint, called `what`, of a tracker that is not saved.
+
+    Raises:
+        ConfigError: the tracker's engine keeps no state.
+    """
+    if not tracker.can_save:
+        engine = tracker.config.tracker.engine
+        raise ConfigError(f"{what} does not go with tracker.engine={engine}: it is not saved")
+
+
+class LiveTracker:
     """A tracker that takes scans in the order in which they arrive.
 
     Args:
@@ -60,11 +70,8 @@ class LiveTracker(MetSensors):
             raise ConfigError(f"{policy!r} is not one of {', '.join(POLICIES)}")
         config = tracker.config
         self.tracker = tracker
-        self._told = ToldSoFar()
-        if config.input.undeclared != "declare" or tracker.meets_as_it_goes:
-            self._told.forget()
         self.policy = policy
-        self.lateness = LatenessCounter(config.sensor_names)
+        self.lateness = LatenessCounter()
         self.measured: list[tuple[float, RecordArray]] = []
         self._base = TimeBase(config.live.jump_s)
         self._repetition = Repetition(self._base, whole=tracker.time is None)
@@ -76,14 +83,12 @@ class LiveTracker(MetSensors):
         # Of a tracker that has taken scans: to before its time nobody can go back.
         self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
         self._common = CommonPicture.of(config)
-        self.know(config)
-
-    def know(self, config: Config) -> None:
-        """Go by what a configuration says of its sensors: at first, and when one more has been met."""
-        self._latency = {name: sensor.latency_s for name, sensor in config.sensors.items()}
-        self._late_s = {name: most_late_s(config, name) for name in config.sensors}
-        rewinds = self.policy == REWIND
-        self._keep_s = max(self._late_s.values(), default=0.0) + 2.0 * _ROUNDING_S if rewinds else 0.0
+        # Of the sensors that are declared or have been met: known delay of their times, most lateness (s).
+        self._latency: dict[str, float] = {}
+        self._late_s: dict[str, float] = {}
+        self._keep_s = 0.0  # steps that are older than the newest by more are never taken again
+        for name in config.sensors:
+            self._know(name)
 
     @property
     def time(self) -> float | None:
@@ -116,10 +121,8 @@ class LiveTracker(MetSensors):
             TimeOrderError: a scan comes late, and late scans are refused.
         """
         given = as_scans(scans)
-        self.meet(given)
+        self._meet(given)  # sensors are refused before anything is done
         batch = [self._corrected(self._common.scan(scan)) for scan in given]
-        for scan in batch:
-            sensor_index(scan.sensor, self.tracker.config.sensor_names)  # refused before anything is done
         self.measured = []
         before = self.tracker.time
         repeated, new = self._repetition.sort(batch, self._was_taken)
@@ -136,7 +139,6 @@ class LiveTracker(MetSensors):
         table = self.tracker.causal()
         if self.policy == REWIND:
             table = self._rewinding.identities.answer(table)
-        self._told.note("step", given, sum(map(len, given)))
         return Arrival(
             table,
             self.tracker.time or 0.0,
@@ -192,8 +194,9 @@ class LiveTracker(MetSensors):
             more: plain data to be kept with it.
 
         Raises:
-            JeatGraphError: the smoothers are in a process of their own (`smoother.worker`).
+            ConfigError: the engine keeps no checkpoints.
         """
+        check_saved(self.tracker, "a checkpoint")
         # The state before the steps that may be taken again, and their scans: the rest follows from these.
         state = self.tracker.state(self.steps[0].before if self.steps else None)
         state |= {
@@ -223,13 +226,20 @@ class LiveTracker(MetSensors):
             raise DataError("holds a tracker, but not one that takes late scans", path)
         with refusing_damage(path):
             live = LiveTracker(Tracker.from_state(kept, state), state["policy"])
-            live._told.forget()
             live._newest = state["newest"]
             live.lateness.set_state(state["lateness"])
             live._rewinding.set_state(state["rewinding"])
             live._base.set_state(state["base"])
             live._repetition.set_state(state["base"], live.tracker.time)
             return live, state["more"]
+
+    def predict(self, t: float) -> Prediction:
+        """Say where the tracks will be at a time not before the newest scan's (see `Tracker.predict`)."""
+        return self._rewinding.identities.rename(self.tracker.predict(t))
+
+    def drain_smoothed(self) -> Trajectories:
+        """Return the smoothed rows that are final and forget them (see `Tracker.drain_smoothed`)."""
+        return self.tracker.drain_smoothed()
 
     def finish(self) -> Trajectories:
         """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`).
@@ -243,8 +253,24 @@ class LiveTracker(MetSensors):
         self._rewinding.settle(math.inf)
         return self.tracker.finish()
 
+    def _meet(self, scans: Sequence[Scan]) -> None:
+        """Refuse sensors that are not declared and may not be; know those that look for the first time."""
+        self.tracker.meet(scans)
+        for scan in scans:
+            if scan.sensor not in self._late_s:
+                self._know(scan.sensor)
+
+    def _know(self, sensor: str) -> None:
+        """Go by what the configuration says of a sensor, or by what it says of those that nobody declared."""
+        config = self.tracker.config
+        said = config.sensors.get(sensor, SensorConfig())
+        self._latency[sensor] = said.latency_s
+        self._late_s[sensor] = config.live.late_s if said.late_s is None else said.late_s
+        if self.policy == REWIND:
+            self._keep_s = max(self._keep_s, self._late_s[sensor] + 2.0 * _ROUNDING_S)
+
     def _corrected(self, scan: Scan) -> Scan:
-        latency = self._latency.get(scan.sensor, 0.0)
+        latency = self._latency[scan.sensor]
         return replace(scan, t=scan.t - latency) if latency else scan
 
     def _take(self, batch: list[Scan]) -> Taken:

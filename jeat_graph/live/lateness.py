@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,42 +49,42 @@ class Lateness(NamedTuple):
         return f"{often}, median {1e3 * self.median_s:.0f} ms, {within}"
 
 
-class LatenessCounter:
-    """Counts by sensor.
-
-    Args:
-        sensor_names: names of the S sensors.
+@dataclass
+class _Counted:
+    """Counts of one sensor.
 
     Attributes:
-        counts: (S, BINS) scans by how late they were.
-        late: (S,) scans that were late at all.
-        dropped: (S,) scans that were passed over.
-        worst_s: (S,) the latest (s).
+        bins: (BINS,) scans by how late they were.
+        late: scans that were late at all.
+        dropped: scans that were passed over.
+        worst_s: the latest (s).
     """
 
-    def __init__(self, sensor_names: tuple[str, ...]) -> None:
-        self._names = sensor_names
-        self.counts: IntArray = np.zeros((len(sensor_names), BINS), dtype=np.int64)
-        self.late: IntArray = np.zeros(len(sensor_names), dtype=np.int64)
-        self.dropped: IntArray = np.zeros(len(sensor_names), dtype=np.int64)
-        self.worst_s = np.zeros(len(sensor_names))
+    bins: IntArray = field(default_factory=lambda: np.zeros(BINS, dtype=np.int64))
+    late: int = 0
+    dropped: int = 0
+    worst_s: float = 0.0
 
-    def among(self, sensor_names: tuple[str, ...]) -> LatenessCounter:
-        """Return the same counts of a tracker that has more sensors, among them these."""
-        out = LatenessCounter(sensor_names)
-        rows = [sensor_names.index(name) for name in self._names]
-        for name in ("counts", "late", "dropped", "worst_s"):
-            getattr(out, name)[rows] = getattr(self, name)
-        return out
+
+class LatenessCounter:
+    """Counts by sensor, of any names."""
+
+    def __init__(self) -> None:
+        self._by_sensor: dict[str, _Counted] = {}
+
+    @property
+    def dropped(self) -> int:
+        """How many scans of all sensors were passed over."""
+        return sum(one.dropped for one in self._by_sensor.values())
 
     def add(self, sensor: str, late_s: float, dropped: bool) -> None:
         """Count a scan that is so much older than the newest (s); 0 if it is not."""
-        s = self._names.index(sensor)
+        one = self._by_sensor.setdefault(sensor, _Counted())
         late_s = min(late_s, sys.float_info.max)  # from one end of the numbers to the other it is infinite
-        self.counts[s, round(min(late_s / BIN_S, BINS - 1))] += 1
-        self.late[s] += late_s > 0.0
-        self.dropped[s] += dropped
-        self.worst_s[s] = max(self.worst_s[s], late_s)
+        one.bins[round(min(late_s / BIN_S, BINS - 1))] += 1
+        one.late += late_s > 0.0
+        one.dropped += dropped
+        one.worst_s = max(one.worst_s, late_s)
 
     def arrived(self, taken: Sequence[Taken], refuted: Sequence[Scan], before: float | None) -> None:
         """Count scans that have arrived.
@@ -101,30 +102,27 @@ class LatenessCounter:
                     self.add(scan.sensor, one.late_s, passed_over)
 
     def state(self) -> dict[str, Any]:
-        """Return what `set_state` takes; of the counts only those that are not zero."""
-        where = np.nonzero(self.counts)
-        return {
-            "where": np.array(where),
-            "counts": self.counts[where],
-            "late": self.late,
-            "dropped": self.dropped,
-            "worst_s": self.worst_s,
-        }
+        """Return what `set_state` takes; of the bins only those that are not empty."""
+        out = {}
+        for name, one in self._by_sensor.items():
+            filled = np.flatnonzero(one.bins)
+            counts = {"filled": filled, "counts": one.bins[filled]}
+            out[name] = counts | {"late": one.late, "dropped": one.dropped, "worst_s": one.worst_s}
+        return out
 
     def set_state(self, state: dict[str, Any]) -> None:
         """Go on from what `state` returned."""
-        self.counts[tuple(state["where"])] = state["counts"]
-        self.late, self.dropped, self.worst_s = state["late"], state["dropped"], state["worst_s"]
+        for name, saved in state.items():
+            one = _Counted(late=saved["late"], dropped=saved["dropped"], worst_s=saved["worst_s"])
+            one.bins[saved["filled"]] = saved["counts"]
+            self._by_sensor[name] = one
 
     def summary(self) -> dict[str, Lateness]:
-        """Return the summary of each sensor that gave a scan."""
+        """Return the summary of each sensor that gave a scan, in alphabetical order."""
         out = {}
-        for s, name in enumerate(self._names):
-            below = np.cumsum(self.counts[s])
-            if not below[-1]:
-                continue
-            median, p99 = (float(np.searchsorted(below, share * below[-1])) * BIN_S for share in (0.5, 0.99))
-            out[name] = Lateness(
-                int(below[-1]), int(self.late[s]), int(self.dropped[s]), median, p99, float(self.worst_s[s])
-            )
+        for name, one in sorted(self._by_sensor.items()):
+            below = np.cumsum(one.bins)
+            scans = int(below[-1])
+            median, p99 = (float(np.searchsorted(below, share * scans)) * BIN_S for share in (0.5, 0.99))
+            out[name] = Lateness(scans, one.late, one.dropped, median, p99, one.worst_s)
         return out

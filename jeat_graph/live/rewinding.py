@@ -26,6 +26,7 @@ class ReplayableStep:
         t: its time (s).
         scans: its scans, sensors in alphabetical order.
         before: the tracker's state before it.
+        living: identities (N,) of the tracks that lived before it, and that of the next one to be born.
         taken: what the smoothers are to be told of it.
         known: (M,) identity whose track took each detection, 0 where none ever did.
     """
@@ -33,6 +34,7 @@ class ReplayableStep:
     t: float
     scans: list[Scan]
     before: ModelSnapshot
+    living: tuple[IntArray, int]
     taken: PendingStep | None
     known: IntArray
 
@@ -89,7 +91,7 @@ class Rewinding:
         before = later[0].before if later else now
         if later:
             tracker.restore(before)
-        step = ReplayableStep(t, _by_sensor(scans), before, None, _nobody(scans))
+        step = ReplayableStep(t, _by_sensor(scans), before, tracker.living(), None, _nobody(scans))
         if later and later[0].t == t:
             step = _joined(self.steps.pop(k), step)
         self.steps.insert(k, step)
@@ -97,7 +99,7 @@ class Rewinding:
         try:
             for step in self.steps[k:]:
                 if step is not self.steps[k]:
-                    step.before = tracker.snapshot()
+                    step.before, step.living = tracker.snapshot(), tracker.living()
                 step.taken = tracker.take_in(step.scans)
                 takers.append(tracker.takers(len(step.known)))
         except Exception:
@@ -106,8 +108,8 @@ class Rewinding:
             raise
         again = self.steps[k:]
         known = [step.known for step in again]
-        births = before.living()[1], tracker.num_born + 1
-        known = self.identities.follow(*births, takers, known, self.steps[0].before.living()[1])
+        births = again[0].living[1], tracker.num_born + 1
+        known = self.identities.follow(*births, takers, known, self.steps[0].living[1])
         for step, identities in zip(again, known, strict=True):
             step.known = identities
         self.replayed += len(again) - 1
@@ -121,8 +123,7 @@ class Rewinding:
             self.settled = step.t
         del self.steps[:count]
         if count:
-            oldest = self.steps[0].before if self.steps else self._tracker
-            self.identities.forget(*oldest.living())
+            self.identities.forget(*(self.steps[0].living if self.steps else self._tracker.living()))
 
     def mark(self) -> Mark:
         """Return what `go_back` needs."""
@@ -149,9 +150,9 @@ class Rewinding:
         """Go on from what `state` returned: the steps are taken again."""
         self.settled, self.replayed = state["settled"], state["replayed"]
         for scans, known in zip(state["steps"], state["known"], strict=True):
-            before = self._tracker.snapshot()
+            before, living = self._tracker.snapshot(), self._tracker.living()
             taken = self._tracker.take_in(scans)
-            self.steps.append(ReplayableStep(scans[0].t, scans, before, taken, known))
+            self.steps.append(ReplayableStep(scans[0].t, scans, before, living, taken, known))
         self.identities = Identities.from_state(state["identities"])
 
 
@@ -169,4 +170,4 @@ def _joined(old: ReplayableStep, more: ReplayableStep) -> ReplayableStep:
     scans = _by_sensor(old.scans + more.scans)
     known = _nobody(scans)
     known[np.repeat([scan in old.scans for scan in scans], [len(scan) for scan in scans])] = old.known
-    return ReplayableStep(old.t, scans, more.before, None, known)
+    return ReplayableStep(old.t, scans, more.before, more.living, None, known)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from jeat_graph.config.reading import config_to_dict
+from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.counts import Counts, count_lines
 from jeat_graph.live.health import HealthChange, SensorHealth
@@ -208,6 +209,7 @@ class Session:
     def summary(self) -> dict[str, Any]:
         """The record of the session: version, configuration, counts, lateness, what was learnt."""
         lateness = {name: one._asdict() for name, one in self.live.lateness.summary().items()}
+        states = self.live.tracker.sensor_states()
         return {
             "version": __version__,
             "config": config_to_dict(self.live.tracker.config),
@@ -219,7 +221,7 @@ class Session:
             "restarts": dict(self._seen.restarts),
             "steps_taken_again": self.live.replayed,
             "lateness": lateness,
-            "learnt": {name: one._asdict() for name, one in self.live.tracker.sensor_states().items()},
+            "learnt": {name: nan_as_null(one._asdict()) for name, one in states.items()},
         }
 
     def summary_lines(self) -> list[str]:

@@ -15,7 +15,9 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, InputWarning
+from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.progress import refreshing
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory
@@ -174,7 +176,8 @@ class RunSteps:
         record.timings["step_median_ms"] = round(1e3 * float(np.median(step_s)), 4)
         record.timings["step_p99_ms"] = round(1e3 * float(np.quantile(step_s, 0.99)), 4)
         record.counts |= {"tracks_born": self._tracker.num_born, "tracks_reported": len(self._reported)}
-        record.learnt = {name: one._asdict() for name, one in self._tracker.sensor_states().items()}
+        states = self._tracker.sensor_states()
+        record.learnt = {name: nan_as_null(one._asdict()) for name, one in states.items()}
         record.counts["causal_rows"] = self._rows["causal"]
         detections = len(self._detections)
         if detections >= _MANY and self._rows["causal"] < _LEAST_TRACKED * detections:

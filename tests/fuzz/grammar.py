@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.boxes import LARGEST_PX, SMALLEST_PX
-from jeat_graph.detection.declared import declared_of
 
 REFUSED_SHARE = 0.15
 #: Boxes of a burst, and how many in a hundred scans are one.
@@ -47,22 +46,36 @@ def stream(seed: int, sensors: tuple[str, ...], length: int, burst: int = BURST)
     return steps[:length]
 
 
-def settings(seed: int, sensors: tuple[str, ...]) -> list[str]:
-    """Settings that a user may add to any preset: of how boxes fit, of trust, of what networks declare."""
+def settings(seed: int, sensors: tuple[str, ...], preset: str) -> list[str]:
+    """Settings that a user may add: what is known of sensors, of the picture, and what is reported."""
     rng = np.random.default_rng(seed)
-    drawn: list[str] = []
-    if {"rgb", "evt"} <= set(sensors) and rng.random() < 0.5:
-        network = str(rng.choice(["sehn", "sehn-int8", "sehn-fast"]))
-        drawn += declared_of({"rgb": network, "evt": network})
+    drawn = [
+        f"output.min_existence={rng.choice([0.0, 0.5, 0.999])}",
+        f"output.clip={rng.choice(['true', 'false'])}",
+        f"input.picture={rng.choice(['given', 'seen'])}",
+        f"smoother.lag_s={rng.choice([1e-3, 0.1, 1.0, 1e4])}",
+        f"smoother.output_rate_hz={rng.choice([0.0, 1.0, 20.0])}",
+    ]
+    if preset == "paper":
+        return drawn + of_the_paper(rng)
     for name in sensors:
-        drawn.append(f"sensors.{name}.least_overlap={rng.choice([1e-3, 0.3, 0.6, 0.999, 1.0])}")
-        drawn.append(f"sensors.{name}.bias_std={rng.choice([0.0, 0.02, 0.2])}")
-    drawn.append(f"birth.max_overlap={rng.choice([0.0, 0.1, 0.3, 1.0])}")
-    drawn.append(f"association.method={rng.choice(['slots', 'joint', 'sequential'])}")
-    drawn.append(f"lifecycle.field_doubt={rng.choice([0.0, 0.5, 6.0])}")
-    drawn.append(f"lifecycle.disagreement={rng.choice([0.0, 0.5, 3.0])}")
-    drawn.append(f"output.lasting_error={rng.choice([0.0, 0.01, 1.0])}")
+        drawn.append(f"sensors.{name}.kind={rng.choice(['any', 'event'])}")
+        drawn.append(f"sensors.{name}.even_score={rng.choice(['null', '1e-9', '0.5', '1.0'])}")
     return drawn
+
+
+def of_the_paper(rng: np.random.Generator) -> list[str]:
+    """Settings of the paper's own method."""
+    return [
+        f"paper.jerk_px={rng.choice([1e-3, 200.0, 1e4])}",
+        f"paper.adaptation_rate={rng.choice([0.0, 0.1, 1.0])}",
+        f"paper.score_floor={rng.choice([1e-3, 0.1, 1.0])}",
+        f"paper.gate_probability={rng.choice([0.5, 0.99, 1.0 - 1e-12])}",
+        f"paper.confirm_hits={rng.choice([1, 5, 50])}",
+        f"paper.confirm_age_s={rng.choice([0.0, 0.5])}",
+        f"paper.max_gap_confirmed_s={rng.choice([0.0, 0.5, 1e4])}",
+        f"paper.max_gap_tentative_s={rng.choice([0.0, 0.2, 1e4])}",
+    ]
 
 
 def later(rng: np.random.Generator, t: float) -> float:

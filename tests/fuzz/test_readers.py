@@ -117,7 +117,7 @@ def trajectories(path):
 
 def settings(path):
     path.write_text(
-        "base: default\nimage: {width: 640, height: 480}\nmotion:\n  jerk_px: 20\n", encoding="utf-8"
+        "base: default\nimage: {width: 640, height: 480}\npaper:\n  jerk_px: 20\n", encoding="utf-8"
     )
 
 

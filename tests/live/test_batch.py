@@ -111,7 +111,7 @@ def test_a_second_call_keeps_what_is_there_and_makes_what_changed(manifest, tmp_
     assert [row["status"] for row in rows_of(out)] == ["kept", "done"]
     assert (out / "runs" / "r00" / "run.json").stat().st_mtime_ns == times["r00"]
     assert (out / "runs" / "r01" / "run.json").stat().st_mtime_ns > times["r01"]
-    assert main([*call, "--set", "birth.initial=3"]) == 0
+    assert main([*call, "--set", "smoother.lag_s=2"]) == 0
     assert [row["status"] for row in rows_of(out)] == ["done", "done"]
 
 
@@ -147,10 +147,10 @@ def test_a_bad_manifest_is_refused_before_anything_is_tracked(text, message, tmp
 
 
 def test_several_files_and_a_sensors_name_are_found_beside_the_manifest(tmp_path):
-    (tmp_path / "m.csv").write_text("detections,config\nrgb=a/det.csv; evt=b.csv,kitti\n")
+    (tmp_path / "m.csv").write_text("detections,config\nrgb=a/det.csv; evt=b.csv,paper\n")
     (one,) = read_manifest(tmp_path / "m.csv")
     assert one.detections == (f"rgb={tmp_path}/a/det.csv", f"evt={tmp_path}/b.csv")
-    assert (one.name, one.config) == ("det", "kitti")
+    assert (one.name, one.config) == ("det", "paper")
 
 
 def test_two_batches_never_work_in_one_folder(manifest, tmp_path, capsys):
@@ -338,7 +338,7 @@ def test_paths_of_a_manifest_are_seen_from_its_folder(tmp_path):
     (folder / "m.csv").write_text(
         "detections,config,gt,camera,classes,images\n"
         "cam=a.csv;b.csv,my.yaml,gt.csv,camera.yaml,names.txt,images.json\n"
-        "c.csv,highway,,,,\n"
+        "c.csv,paper,,,,\n"
     )
     first, second = read_manifest(folder / "m.csv")
     assert first.detections == (f"cam={folder / 'a.csv'}", str(folder / "b.csv"))
@@ -349,4 +349,4 @@ def test_paths_of_a_manifest_are_seen_from_its_folder(tmp_path):
         "class_names": str(folder / "names.txt"),
         "images": str(folder / "images.json"),
     }
-    assert (second.config, second.reading) == ("highway", {})
+    assert (second.config, second.reading) == ("paper", {})

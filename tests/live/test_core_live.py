@@ -1,18 +1,23 @@
-"""Live use of the core's model: late scans, other clocks, checkpoints, sensors that nobody declared."""
+"""Live use of the engines: late scans, other clocks, checkpoints, sensors that nobody declared."""
 
 from __future__ import annotations
+
+import io
+import json
 
 import numpy as np
 import pytest
 
 from jeat_graph import Tracker, load_config
-from jeat_graph.data.errors import TimeOrderError, UnknownSensorError
+from jeat_graph.cli.main import main
+from jeat_graph.data.errors import ConfigError, TimeOrderError, UnknownSensorError
 from jeat_graph.data.scan import Scan
 from jeat_graph.live.late import LiveTracker
 
 _PICTURE = ["image.width=1280", "image.height=720", "input.picture=given"]
-CONFIG = load_config("core", [*_PICTURE, "smoother.lag_s=.4", "live.late_s=.3"])
-WHOLE = load_config("core", [*_PICTURE, "smoother.engine=rts", "live.late_s=.3"])
+CONFIG = load_config("default", [*_PICTURE, "smoother.lag_s=.4", "live.late_s=.3"])
+WHOLE = load_config("default", [*_PICTURE, "smoother.engine=rts", "live.late_s=.3"])
+PAPER = load_config("paper", [*_PICTURE, "smoother.lag_s=.4", "live.late_s=.3"])
 
 
 def traffic(times=80, seed=0, sensors=("cam", "evt"), classes=True):
@@ -72,7 +77,7 @@ def _rows(table):
         yield (float(table.t[k]), *table.boxes[k].tolist(), float(table.existence[k]), str(table.classes[k]))
 
 
-@pytest.mark.parametrize("config", [CONFIG, WHOLE], ids=["lag", "whole"])
+@pytest.mark.parametrize("config", [CONFIG, WHOLE, PAPER], ids=["lag", "whole", "paper"])
 @pytest.mark.parametrize("seed", range(3))
 def test_scans_that_come_late_give_the_rows_of_scans_in_order_to_the_last_bit(config, seed):
     scans = list(traffic(seed=seed))
@@ -83,9 +88,10 @@ def test_scans_that_come_late_give_the_rows_of_scans_in_order_to_the_last_bit(co
     assert columns(live.causal()) == columns(plain.causal())
 
 
-def test_the_first_scan_of_a_sensor_may_come_late_too():
+@pytest.mark.parametrize("config", [CONFIG, PAPER], ids=["core", "paper"])
+def test_the_first_scan_of_a_sensor_may_come_late_too(config):
     scans = list(traffic(times=20, sensors=("zed", "abe")))
-    plain, live = Tracker(CONFIG), LiveTracker(Tracker(CONFIG))
+    plain, live = Tracker(config), LiveTracker(Tracker(config))
     for scan in scans:
         plain.step(scan)
     for scan in [scans[1], scans[0], *scans[2:]]:
@@ -110,6 +116,23 @@ def test_a_stream_goes_on_from_a_checkpoint_with_the_same_bytes(config, policy, 
     assert columns(second.finish()) == columns(whole.finish())
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ["--config", "paper"],
+        ["--set", "tracker.engine=reference", "--set", "smoother.engine=rts"],
+    ],
+)
+def test_a_checkpoint_of_an_engine_that_is_not_saved_is_refused_before_anything(settings, tmp_path, capsys):
+    ends = ["--checkpoint", str(tmp_path / "state.npz"), "--smoothed", str(tmp_path / "s.csv")]
+    assert main(["stream", *settings, *ends]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--checkpoint does not go with tracker.engine=" in line
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(ConfigError, match="is not saved"):
+        LiveTracker(Tracker(PAPER)).save(tmp_path / "state.npz")
+
+
 @pytest.mark.parametrize(("policy", "late"), [("skip", 1), ("refuse", 0)])
 def test_late_scans_are_passed_over_or_refused(policy, late):
     live = LiveTracker(Tracker(CONFIG), policy)
@@ -124,7 +147,7 @@ def test_late_scans_are_passed_over_or_refused(policy, late):
 
 
 def test_a_clock_that_is_set_back_lets_time_begin_anew_and_what_was_learnt_stays():
-    live = LiveTracker(Tracker(load_config("core", [*_PICTURE, "smoother.lag_s=.4", "live.jump_s=1"])))
+    live = LiveTracker(Tracker(load_config("default", [*_PICTURE, "smoother.lag_s=.4", "live.jump_s=1"])))
     for scan in traffic(times=60):
         live.step(scan)
     learnt, born = live.tracker.sensor_states(), live.tracker.num_born
@@ -142,7 +165,7 @@ def _rest(scan):
 
 
 def test_a_sensor_that_nobody_declared_is_met_or_refused():
-    strict = load_config("core", [*_PICTURE, "input.undeclared=refuse"])
+    strict = load_config("default", [*_PICTURE, "sensors.rgb={}", "input.undeclared=refuse"])
     live, tracker = LiveTracker(Tracker(strict)), Tracker(strict)
     for one in (live, tracker):
         with pytest.raises(UnknownSensorError, match="nobody"):
@@ -152,6 +175,27 @@ def test_a_sensor_that_nobody_declared_is_met_or_refused():
     met.step((0.1, "somebody", [[1, 1, 20, 20]], [0.5]))
     assert "somebody" in met.tracker.config.sensors
     assert met.lateness.summary()["somebody"].scans == 1
+
+
+def no_number(name):
+    raise AssertionError(f"{name} is no JSON")
+
+
+@pytest.mark.parametrize("preset", ["default", "paper"])
+def test_a_stream_of_sensors_that_nobody_declared_ends_with_a_record(preset, tmp_path, monkeypatch):
+    box = {"boxes": [[100, 100, 40, 30]], "scores": [0.9]}
+    lines = [json.dumps({"t": 0.05 * k, "sensor": ("cam", "evt")[k % 2], **box}) for k in range(80)]
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines).encode())))
+    record = tmp_path / "record.json"
+    assert main(["stream", "--config", preset, "--record", str(record)]) == 0
+    learnt = json.loads(record.read_text(), parse_constant=no_number)["learnt"]
+    assert {"cam", "evt"} <= learnt.keys()
+    rows = [f"{0.05 * k},cam,100,100,40,30,0.9" for k in range(40)]
+    table = tmp_path / "d.csv"
+    table.write_text("\n".join(["t,sensor,left,top,width,height,score", *rows]))
+    assert main(["track", str(table), "--config", preset, "--out", str(tmp_path / "run")]) == 0
+    run = json.loads((tmp_path / "run" / "run.json").read_text(), parse_constant=no_number)
+    assert "cam" in run["learnt"]
 
 
 def test_what_will_be_is_said_by_the_identities_that_were_given_out():
@@ -164,7 +208,7 @@ def test_what_will_be_is_said_by_the_identities_that_were_given_out():
 
 
 def test_boxes_of_a_sensor_with_a_picture_of_its_own_go_to_the_common_one():
-    half = load_config("core", [*_PICTURE, "sensors.small={rate_hz: 20, image: [640, 360]}"])
+    half = load_config("default", [*_PICTURE, "sensors.small={rate_hz: 20, image: [640, 360]}"])
     live, direct, plain = LiveTracker(Tracker(half)), Tracker(half), Tracker(CONFIG)
     for scan in traffic(times=20, sensors=("cam",)):
         own = Scan(scan.t, "small", scan.boxes / 2.0, scan.scores)

@@ -18,7 +18,7 @@ from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.tracker import Tracker
 
 PICTURE = ["image.width=1920", "image.height=1080"]
-CONFIG = load_config("default", [*PICTURE, "smoother.lag_s=0.5", "smoother.chunk=8"])
+CONFIG = load_config("default", [*PICTURE, "smoother.lag_s=0.5"])
 
 
 class World:

@@ -37,8 +37,6 @@ def options(folder):
         *(
             "--set",
             "smoother.lag_s=0.4",
-            "--set",
-            "smoother.chunk=8",
             "--record",
             str(folder / "record.json"),
         ),

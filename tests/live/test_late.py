@@ -20,8 +20,8 @@ from jeat_graph_sehn.simulation.scenario import load_scenario
 from jeat_graph_sehn.simulation.simulate import record
 
 PICTURE = ["image.width=1280", "image.height=720", "input.picture=given"]
-CONFIG = load_config("core", [*PICTURE, "smoother.lag_s=0.4"])
-CAUSAL = load_config("core", [*PICTURE, "smoother.engine=none"])
+CONFIG = load_config("default", [*PICTURE, "smoother.lag_s=0.4"])
+CAUSAL = load_config("default", [*PICTURE, "smoother.engine=none"])
 MOST_LATE_S = 0.3
 
 
@@ -131,7 +131,7 @@ def scan(t, sensor="rgb"):
 
 def test_what_comes_too_late_or_twice_is_passed_over_and_counted():
     config = load_config(
-        "core", [*PICTURE, "live.late_s=0.2", "sensors.evt.late_s=0.05", "smoother.engine=none"]
+        "default", [*PICTURE, "live.late_s=0.2", "sensors.evt.late_s=0.05", "smoother.engine=none"]
     )
     live = LiveTracker(Tracker(config))
     live.step(scan(1.0))
@@ -168,7 +168,7 @@ def test_the_other_policies_pass_over_or_refuse():
 
 
 def test_a_known_latency_is_taken_off_the_time():
-    config = load_config("core", [*PICTURE, "sensors.rgb.latency_s=0.08", "smoother.engine=none"])
+    config = load_config("default", [*PICTURE, "sensors.rgb.latency_s=0.08", "smoother.engine=none"])
     live, plain = LiveTracker(Tracker(config)), Tracker(config)
     for k in range(30):
         live.step(scan(0.02 * k, "evt"))
@@ -239,7 +239,7 @@ def test_a_late_picture_costs_no_more_than_the_steps_it_makes_anew(full, capsys)
 def test_an_arrival_takes_ten_milliseconds_at_most_with_and_without_a_smoother(engine, full, capsys):
     """99 % of them, in processor time: pictures 80 ms late, events 5 ms; 50 ms at 100 vehicles."""
     for count, most_s in ((20, 0.010), (100, 0.050)) if full else ((20, 0.010),):
-        live = LiveTracker(Tracker(load_config("core", [*PICTURE, f"smoother.engine={engine}"])))
+        live = LiveTracker(Tracker(load_config("default", [*PICTURE, f"smoother.engine={engine}"])))
         came = sorted(
             busy_scans(count, 10.0 if full else 3.0),
             key=lambda one: one.t + (0.08 if one.sensor == "rgb" else 0.005),
@@ -300,7 +300,7 @@ def test_a_scan_that_is_refused_leaves_what_may_be_taken_again_as_it_was():
         looks = None if numbers is None else np.ones((1, numbers))
         return Scan(t, "rgb", [[100.0 + 40.0 * t, 100.0, 40.0, 30.0]], [0.9], None, looks)
 
-    config = load_config("core", [*PICTURE, "smoother.engine=none", "live.late_s=1"])
+    config = load_config("default", [*PICTURE, "smoother.engine=none", "live.late_s=1"])
     asked, plain = LiveTracker(Tracker(config)), LiveTracker(Tracker(config))
     for k, numbers in enumerate([None, 3, 3, 3]):
         asked.step(scan(0.1 * k, numbers))
@@ -316,7 +316,7 @@ def test_a_scan_that_is_refused_leaves_what_may_be_taken_again_as_it_was():
 
 def test_sensors_of_other_delays_are_steps_of_their_own_and_none_is_lost():
     late = ["sensors.rgb.latency_s=0.02", "smoother.engine=none"]
-    live = LiveTracker(Tracker(load_config("core", [*PICTURE, *late]), diagnostics=True), "skip")
+    live = LiveTracker(Tracker(load_config("default", [*PICTURE, *late]), diagnostics=True), "skip")
     box, found = [[300.0, 300.0, 40.0, 30.0]], []
     for k in range(20):
         live.step([(0.05 * k, name, box, [0.9]) for name in ("evt", "rgb")])
@@ -365,7 +365,7 @@ def test_of_scans_that_are_refused_together_none_has_come(policy):
     """Sensors of other delays are steps of their own: the first is fine, the second is not."""
     settings_ = ["sensors.rgb.latency_s=0.05", "smoother.lag_s=0.3"]
     asked, plain = (
-        LiveTracker(Tracker(load_config("core", [*PICTURE, *settings_])), policy) for _ in range(2)
+        LiveTracker(Tracker(load_config("default", [*PICTURE, *settings_])), policy) for _ in range(2)
     )
     for k in range(8):
         for live in (asked, plain):

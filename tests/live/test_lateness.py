@@ -16,14 +16,14 @@ from jeat_graph.live.lateness import LatenessCounter
     ],
 )
 def test_what_is_later_than_what_is_counted_is_said_to_be_so(late_s, text):
-    counter = LatenessCounter(("rgb",))
+    counter = LatenessCounter()
     for one in late_s:
         counter.add("rgb", one, dropped=False)
     assert counter.summary()["rgb"].text() == text
 
 
 def test_the_greatest_lateness_there_is_can_be_counted():
-    counter = LatenessCounter(("rgb",))
+    counter = LatenessCounter()
     counter.add("rgb", 1.7e308 - -1.7e308, True)
     assert counter.summary()["rgb"].dropped == 1
     assert counter.summary()["rgb"].max_s < float("inf")

@@ -23,11 +23,11 @@ def test_a_killed_camera_goes_on_where_it_was(simulated, tmp_path):
     exec(compile(recipe, "recipe", "exec"), names)
     detections = read_detections(simulated(1) / "detections.csv")
     scans = [detections.scan(k) for k in range(detections.num_scans)]
-    alone = LiveTracker(Tracker("highway"))
+    alone = LiveTracker(Tracker("default"))
     expected = [alone.step(scan).table for scan in scans]
     ray.init(num_cpus=2, include_dashboard=False, logging_level="error", log_to_driver=False)
     try:
-        camera = names["Camera"].remote("north", tmp_path, "highway", every_s=0.3)
+        camera = names["Camera"].remote("north", tmp_path, "default", every_s=0.3)
         half = len(scans) // 2
         saved_at = 0.0
         for scan in scans[:half]:

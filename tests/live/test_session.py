@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 
 import pytest
 
+from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import DataError
 from jeat_graph.live.late import LiveTracker
@@ -16,7 +18,7 @@ from jeat_graph.live.told import MOST_TOLD
 from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.tracking.tracker import Tracker
 
-CONFIG = load_config("default", ["smoother.engine=none"])
+CONFIG = load_config("default", ["smoother.engine=none", "sensors.rgb={}", "sensors.evt={}"])
 
 
 def message(seq, t, source="g7", sensor="rgb"):
@@ -175,3 +177,35 @@ def test_what_a_damaged_checkpoint_keeps_is_refused_in_one_line(kept, tmp_path):
     path = tmp_path / "state.npz"
     with pytest.raises(DataError, match=r"state\.npz: is damaged"):
         Session(LiveTracker(Tracker(CONFIG)), Ends(lambda *_: None), path, more=kept)
+
+
+class Sink:
+    """Takes messages to a broker."""
+
+    too_large = 0
+
+    def __init__(self) -> None:
+        self.told = []
+
+    def send(self, message) -> None:
+        self.told.append(json.loads(message))
+
+    def flush(self) -> None: ...
+
+    def close(self) -> None: ...
+
+
+def test_after_a_restart_messages_are_numbered_on_from_the_last_events_too(tmp_path, monkeypatch):
+    """A sensor that falls silent and comes back makes two messages that answer none."""
+    times = [(0.05 * k, "rgb") for k in range(20)] + [(1.0 + 0.05 * k, "evt") for k in range(80)]
+    times += [(5.0, "rgb"), *((5.0 + 0.05 * k, "evt") for k in range(1, 15))]
+    boxes = {"boxes": [[100, 100, 40, 30]], "scores": [0.9]}
+    lines = [json.dumps({"t": t, "sensor": sensor, **boxes}).encode() + b"\n" for t, sensor in times]
+    sink = Sink()
+    monkeypatch.setattr("jeat_graph.live.transport.ends.open_sink", lambda *_: sink)
+    command = ["stream", "--sink", "mqtt://nowhere/tracks", "--checkpoint", str(tmp_path / "state.npz")]
+    for part in (lines[:60], lines[60:90], lines[90:]):
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"".join(part))))
+        assert main(command) == 0
+    assert [one["event"] for one in sink.told if "event" in one] == ["sensor-silent", "sensor-back"]
+    assert [one["seq"] for one in sink.told] == list(range(len(lines) + 2))

@@ -68,7 +68,7 @@ struct RepeatCounts {
         }
         const double top = (best_repeated + kBestCount * c.repeat_share) / (best + kBestCount);
         for (int g = kScoreBins - 1; g >= 0; --g) {
-            const double share = (repeated[g] + c.repeat_count * c.repeat_share * top) / (boxes[g] + c.repeat_count) / top;
+            const double share = (repeated[g] + c.repeat_count * c.repeat_share) / (boxes[g] * top + c.repeat_count);
             if (share < 0.5) return kFirstLogit + g * kLogitStep;
         }
         return kFirstLogit;

@@ -17,7 +17,7 @@ from jeat_graph.io.locking import hold_file
 from jeat_graph.io.scan_batch import ScanBatch
 from jeat_graph.io.stream_reading import StreamReading
 from jeat_graph.live.interrupts import Interrupts
-from jeat_graph.live.late import LiveTracker
+from jeat_graph.live.late import LiveTracker, check_saved
 from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.service.cameras import Cameras
 from jeat_graph.live.service.config import ServiceConfig
@@ -84,7 +84,9 @@ class Service:
                 if path is not None:
                     stack.enter_context(hold_file(path))
             tracker = config.tracker  # what is wrong of these is known before anything is opened
-            load_config(tracker.config, list(tracker.set), tracker.rig)
+            settings = load_config(tracker.config, list(tracker.set), tracker.rig)
+            if config.state.checkpoint is not None:
+                check_saved(Tracker(settings), "state.checkpoint")
             self._saved_tracker(None)
             if config.web.port:
                 web = stack.enter_context(Web(config.web.host, config.web.port, status))
@@ -263,7 +265,7 @@ class Service:
         counted.duplicates = session.duplicates
         if session.duplicates == before:
             self.status.came(message.batch.scans)
-        counted.passed_over = int(session.live.lateness.dropped.sum())
+        counted.passed_over = session.live.lateness.dropped
 
     def _bad(self, error: DataError, running: _Running) -> None:
         if self._config.on_error == "stop":
