@@ -94,6 +94,8 @@ class ModelConstants:
         unknown_score: score of a box that has none.
         repeat_overlap: IoU from which on a box comes again at its place.
         repeat_share: prior share of the best boxes that come again.
+        repeat_told: share of the best boxes below which the counts say less and less: all moves far from one
+            scan to the next.
         repeat_count: boxes that this prior counts for, in each score bin.
         best_share: of the boxes, by score, that are the yardstick.
         indifference_offset, indifference_slope: a_s = −(offset + slope · z), z the logit below which fewer
@@ -208,6 +210,7 @@ class ModelConstants:
     unknown_score: float = 0.8
     repeat_overlap: float = 0.4
     repeat_share: float = 0.8
+    repeat_told: float = 0.3
     repeat_count: float = 4.0
     best_share: float = 0.3
     indifference_offset: float = 0.4

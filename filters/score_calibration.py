@@ -23,6 +23,7 @@ SCORE_GRID = np.arange(-4.5, 7.01, 0.25)
 _BANDWIDTH = 0.35
 # The share of the best boxes that divides the others starts with the prior of so many boxes.
 _BEST_COUNT = 5.0
+_LEAST_BOXES = 1e-9
 # Scores are kept this far from 0 and 1, lest a logit be infinite.
 _LEAST_SCORE = 1e-3
 # z₀ before anything is counted.
@@ -101,9 +102,10 @@ def half_as_many(counts: RepeatCounts, c: ModelConstants) -> float:
     best = np.cumsum(total[::-1])[::-1] <= c.best_share * total.sum()
     best[-1] = True
     top = (repeated[best].sum() + _BEST_COUNT * c.repeat_share) / (total[best].sum() + _BEST_COUNT)
-    # Poisson counts with a gamma prior: where even the best hardly come again, since all moves far from one
-    # scan to the next, the counts say little.
-    share = (repeated + c.repeat_count * c.repeat_share) / (total * top + c.repeat_count)
+    # Where even the best hardly come again, since all moves far from one scan to the next, counts say little.
+    told = total * min(1.0, (top / c.repeat_told) ** 2)
+    prior = c.repeat_count * c.repeat_share
+    share = (told * repeated / (total * top + _LEAST_BOXES) + prior) / (told + c.repeat_count)
     low = np.flatnonzero(share < 0.5)
     return float(SCORE_GRID[low[-1] if len(low) else 0])
 

@@ -53,6 +53,7 @@ def table_of(
     called: ClassNames | None,
     instants: FloatArray | None = None,
     clip: tuple[float, float] | None = None,
+    least: float = 0.0,
 ) -> Trajectories:
     """Return rows as a table.
 
@@ -62,6 +63,7 @@ def table_of(
         places: where the model's sensors stand among these.
         called: the classes; None for a table without any.
         instants: at which there was a table, be it of no row (s).
+        least: probability of existence below which a row is left out.
         clip: width and height of the picture (px) at whose edge boxes end; None where they do not.
     """
     t, ids, mean, variance, real, used, label, share = rows
@@ -88,7 +90,7 @@ def table_of(
         instants=instants,
         class_ids=(called.numbers or None) if called is not None else None,
     )
-    left = (table.boxes[:, 2:] > 0.0).all(axis=1)
+    left = (table.boxes[:, 2:] > 0.0).all(axis=1) & (table.existence >= least)
     return table if left.all() else table.take(np.flatnonzero(left))
 
 

@@ -77,7 +77,6 @@ def test_at_ten_scans_a_second_next_to_every_vehicle_is_followed(seed):
 
 
 @pytest.mark.parametrize(("rate_hz", "least"), [(1.5, 30.0), (2.0, 55.0), (5.0, 80.0)])
-@pytest.mark.xfail(strict=True, reason="further than about half its length a vehicle is not found again")
 def test_with_few_scans_a_second_most_vehicles_are_followed(rate_hz, least):
     detections, truth = highway(rate_hz, 0)
     assert mota(track(detections, image=IMAGE).causal, truth) > least

@@ -94,6 +94,7 @@ struct Bounds {
     JEAT_ONE(unknown_score) \
     JEAT_ONE(repeat_overlap) \
     JEAT_ONE(repeat_share) \
+    JEAT_ONE(repeat_told) \
     JEAT_ONE(repeat_count) \
     JEAT_ONE(best_share) \
     JEAT_ONE(indifference_offset) \

@@ -55,6 +55,7 @@ struct RepeatCounts {
         has_last = true;
     }
 
+    static constexpr double kLeastBoxes = 1e-9;
     double half_as_many(const ModelConstants& c) const {
         double total = 0.0;
         for (const double b : boxes) total += b;
@@ -68,7 +69,9 @@ struct RepeatCounts {
         }
         const double top = (best_repeated + kBestCount * c.repeat_share) / (best + kBestCount);
         for (int g = kScoreBins - 1; g >= 0; --g) {
-            const double share = (repeated[g] + c.repeat_count * c.repeat_share) / (boxes[g] * top + c.repeat_count);
+            const double told = boxes[g] * std::min(1.0, square(top / c.repeat_told));
+            const double share = (told * repeated[g] / (boxes[g] * top + kLeastBoxes) + c.repeat_count * c.repeat_share) /
+                                 (told + c.repeat_count);
             if (share < 0.5) return kFirstLogit + g * kLogitStep;
         }
         return kFirstLogit;
