@@ -312,9 +312,9 @@ class ModelTracker(Updates, SavedModel):
         learnt = self._model.learnt()
         noise = singer.ProcessNoise(*learnt["process_noise"]), float(learnt["log_scene_variance"])
         rows, covariance = predicted(rows, self._model.states(), t, noise, self.constants)
-        there = still_there(rows, self._model.picture())
-        table = self._table(rows).take(there)
-        return Prediction(**vars(table), cov=of_motion(covariance[there]))
+        table = self._table(rows)
+        table = table.take(np.isin(table.track_id, rows[1][still_there(rows, self._model.picture())]))
+        return Prediction(**vars(table), cov=of_motion(covariance[np.isin(rows[1], table.track_id)]))
 
     def last_updates(self) -> Diagnostics:
         """Return what the last step gave to the tracks, those too that are not reported.

@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from jeat_graph import Tracker, load_config
+from jeat_graph import Tracker, Trajectories, load_config
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import ConfigError, TimeOrderError, UnknownSensorError
 from jeat_graph.data.scan import Scan
@@ -196,6 +196,19 @@ def test_a_stream_of_sensors_that_nobody_declared_ends_with_a_record(preset, tmp
     assert main(["track", str(table), "--config", preset, "--out", str(tmp_path / "run")]) == 0
     run = json.loads((tmp_path / "run" / "run.json").read_text(), parse_constant=no_number)
     assert "cam" in run["learnt"]
+
+
+@pytest.mark.parametrize("engine", ["fixed-lag", "rts"])
+def test_scans_of_one_time_that_come_one_by_one_are_one_smoothed_row(engine):
+    live = LiveTracker(Tracker(load_config("default", [*_PICTURE, f"smoother.engine={engine}"])), "skip")
+    parts = []
+    for k in range(60):
+        for sensor in ("evt", "rgb"):
+            live.step((0.05 * k, sensor, [[100.0 + 3 * k, 200.0, 80.0, 60.0]], [0.9]))
+            parts.append(live.drain_smoothed())
+    rows = Trajectories.concatenate([*parts, live.finish()])
+    assert len(rows) == len(set(zip(rows.t.tolist(), rows.track_id.tolist(), strict=True))) == 60
+    assert set(rows.sensor_text()) == {"evt|rgb"}
 
 
 def test_what_will_be_is_said_by_the_identities_that_were_given_out():
