@@ -465,7 +465,9 @@ class ModelTracker(Updates, SavedModel):
         names = None if self._classes is None else ClassNames(self._called, self._class_ids)
         ends = self.config.output.clip and self._model.boxes_end_at_edge()
         clip = (self.config.image.width, self.config.image.height) if ends else None
-        return table_of(rows, self.sensor_names, self._places, names, instants, clip, self.config.output.min_existence)
+        return table_of(
+            rows, self.sensor_names, self._places, names, instants, clip, self.config.output.min_existence
+        )
 
     def _find_places(self) -> None:
         """Find out where the model's sensors stand among all."""

@@ -276,8 +276,9 @@ class ReferenceModel:
         seen_next, final = np.full(size, np.inf), np.zeros(size)
         told = {}
         last_records = np.cumsum([len(one.records) for one in self._steps]) - 1
-        for number in range(len(self._steps) - 1, -1, -1):
-            moment = self._steps[number]
+        steps = _with_sensors_of_their_time(self._steps)
+        for number in range(len(steps) - 1, -1, -1):
+            moment = steps[number]
             ids, found = moment.track_id, moment.used != 0
             last = found & np.isinf(seen_next[ids])
             final[ids[last]] = moment.real[last]
@@ -285,7 +286,7 @@ class ReferenceModel:
             real = np.where(final[ids] > c.sure, np.maximum(moment.real, final[ids]), moment.real)
             nearer = np.minimum(moment.t - before[number], seen_next[ids] - moment.t)
             real = np.where(found, real, real * gap_survival.survival(self._state.gaps, nearer, c))
-            if number + 1 < len(self._steps) and self._steps[number + 1].t == moment.t:
+            if number + 1 < len(steps) and steps[number + 1].t == moment.t:
                 continue  # a later step of the same time tells more
             told[int(last_records[number])] = moment, np.where(np.isinf(seen_next[ids]), 0.0, real)
         parts = []
@@ -334,6 +335,20 @@ class ReferenceModel:
             "boxes_beyond": state.boxes_beyond,
             "process_noise": tuple(state.process_noise),
         }
+
+
+def _with_sensors_of_their_time(steps: Sequence[Step]) -> list[Step]:
+    """Return steps whose tracks have been found by the sensors of earlier steps of the same time as well."""
+    out: list[Step] = []
+    for one in steps:
+        used = one.used
+        if out and out[-1].t == one.t:
+            before = out[-1]
+            lived = np.isin(before.track_id, one.track_id)
+            used = used.copy()
+            used[np.searchsorted(one.track_id, before.track_id[lived])] |= before.used[lived]
+        out.append(one._replace(used=used))
+    return out
 
 
 def _rows(

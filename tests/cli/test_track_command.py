@@ -118,9 +118,6 @@ def test_a_vehicle_seen_steadily_is_one_track(write, tmp_path):
     assert set(table.track_id) == {1}
     assert table.t[-1] == pytest.approx(1.45)
 
-
-@pytest.mark.xfail(strict=True, reason="nothing reads output.min_existence")
-def test_rows_are_written_of_tracks_that_exist_with_enough_probability(write, tmp_path):
     never = ["--set", "output.min_existence=1"]
     assert main(["track", write(*STEADY), "--out", str(tmp_path / "run"), *never]) == 0
     assert len(read_trajectories(tmp_path / "run" / "causal.csv")) == 0

@@ -233,7 +233,10 @@ private:
             if (e.used) last_seen = e.t;
             double real = final_real > c.sure ? std::max(e.real, final_real) : e.real;
             if (!std::isfinite(until_seen_[given])) continue;  // not seen again
-            if (given + 1 < n && entries[given + 1].t == e.t) continue;  // a later step of the same time tells more
+            if (given + 1 < n && entries[given + 1].t == e.t) {  // a later step of the same time tells more
+                entries[given + 1].used |= e.used;
+                continue;
+            }
             if (!e.used) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
             if (real > c.report)
                 out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used);
