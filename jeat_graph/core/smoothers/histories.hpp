@@ -216,6 +216,8 @@ private:
             }
         }
         // What it turned out to be counts where that is sure; while nobody sees it, its gap must be one that ends well.
+        for (std::size_t k = 0; k + 1 < n; ++k)
+            if (entries[k + 1].t == entries[k].t) entries[k + 1].used |= entries[k].used;
         double final_real = 0.0, next_seen = std::numeric_limits<double>::infinity();
         until_seen_.assign(n, 0.0);
         for (std::size_t k = n; k-- > 0;) {
@@ -233,10 +235,7 @@ private:
             if (e.used) last_seen = e.t;
             double real = final_real > c.sure ? std::max(e.real, final_real) : e.real;
             if (!std::isfinite(until_seen_[given])) continue;  // not seen again
-            if (given + 1 < n && entries[given + 1].t == e.t) {  // a later step of the same time tells more
-                entries[given + 1].used |= e.used;
-                continue;
-            }
+            if (given + 1 < n && entries[given + 1].t == e.t) continue;  // a later step of the same time tells more
             if (!e.used) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
             if (real > c.report)
                 out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used);
