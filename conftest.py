@@ -17,8 +17,9 @@ _TESTS = Path(__file__).parent / "tests"
 # This is before anything that loads it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# Examples follow from the test and from the constants in the modules that are loaded, not from a clock: what a test
-# counts over its examples still differs a little with what ran before it, and its bound must allow for that.
+# Examples follow from the test and from the constants in the modules that are loaded, not from a clock:
+# what a test counts over its examples still differs a little with what ran before it, and its bound must
+# allow for that.
 settings.register_profile("jeat-graph", deadline=None, derandomize=True)
 settings.load_profile("jeat-graph")
 

@@ -171,8 +171,8 @@ def in_perspective(F: FloatArray, mean: FloatArray, dt: float, c: ModelConstants
 def told_motion(mean: FloatArray) -> FloatArray:
     """Return what tables tell of states (N, 2, 7): the motion (N, 2, 5) of the box as detectors have it.
 
-    What lasts of their errors is in it: smoothed, a box without that follows the model's errors instead of its
-    own (position's RMSE 3.1 px and with it 2.1 px on simulated roads). Its variances stay those of the object.
+    What lasts of their errors is in it: smoothed, a box without that follows the model's errors instead of
+    its own (position's RMSE 3.1 px and with it 2.1 px on simulated roads). Variances stay the object's.
     """
     out = mean[..., :MOTION].copy()
     out[..., POSITION] += mean[..., POSITION_ERROR]

@@ -14,8 +14,8 @@ class OutputConfig(Section):
     min_existence: float = number(
         0.5,
         "1",
-        "rows are written where the probability that the object exists is at least this; tracks that are less "
-        "likely real than not are never written but by the engine `paper`",
+        "rows are written where the probability that the object exists is at least this; tracks that are "
+        "less likely real than not are never written but by the engine `paper`",
         0.0,
         1.0,
     )

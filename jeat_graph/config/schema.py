@@ -1,8 +1,8 @@
 """The whole configuration of a tracker: every setting with unit, bounds and meaning.
 
 A configuration is a tree of frozen dataclasses, one a section; a setting is declared once, in the class
-of its section. `config.reading` reads the tree from YAML. Constants of the model that no user changes stand in
-`filters.model_constants`.
+of its section. `config.reading` reads the tree from YAML. Constants of the model that no user changes stand
+in `filters.model_constants`.
 """
 
 from __future__ import annotations

@@ -17,7 +17,6 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, InputWarning
 from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.progress import refreshing
-from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.formats import BY_FRAME
 from jeat_graph.io.piecewise import PiecewiseWriter
 from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory

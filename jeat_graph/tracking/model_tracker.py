@@ -70,9 +70,10 @@ class ModelTracker(Updates, SavedModel):
     """The model as a tracker.
 
     Sensors have any names and are known from their first scan on. Boxes are reported up to the edge of the
-    picture where `output.clip` says so and the detectors' end there, else as they are. Of the configuration it takes the size of the picture, if that was given, the smoother (with
-    a fixed lag rows are final after twice `smoother.lag_s`, else when their track has ended), and of a sensor
-    its own picture, what kind it is and at which score its boxes are as likely real as not.
+    picture where `output.clip` says so and the detectors' end there, else as they are. Of the configuration
+    it takes the size of the picture, if that was given, the smoother (with a fixed lag rows are final after
+    twice `smoother.lag_s`, else when their track has ended), and of a sensor its own picture, what kind it is
+    and at which score its boxes are as likely real as not.
 
     Args:
         config: a configuration, the name of a preset, or of a YAML file.
