@@ -185,7 +185,7 @@ class ModelConstants:
     first_period_s: float = 0.05
     p_detect: float = 0.7
     p_detect_strength: float = 3.0
-    p_detect_bounds: tuple[float, float] = (0.2, 0.98)
+    p_detect_bounds: tuple[float, float] = (0.1, 0.98)
     track_p_detect_bounds: tuple[float, float] = (0.02, 0.98)
     track_p_detect_memory_s: float = 1.5
     p_detect_count: float = 6.0

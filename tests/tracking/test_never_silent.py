@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from jeat_graph.core import _core
 from jeat_graph.filters.model_constants import ModelConstants
@@ -77,10 +76,8 @@ def share_tracked(seed):
     return sees, told / max(moments, 1), moments
 
 
-@pytest.mark.parametrize("first", [0, 10, 20])
-def test_no_pair_of_sensors_is_tracked_in_silence(first):
-    shares = [share_tracked(seed) for seed in range(first, first + 10)]
-    consistent = [share for sees, share, moments in shares if sees and moments]
-    assert np.mean(consistent) > CONSISTENT
+def test_no_pair_of_sensors_is_tracked_in_silence():
+    shares = [share_tracked(seed) for seed in range(30)]
+    assert np.mean([share for sees, share, moments in shares if sees and moments]) > CONSISTENT
     assert np.mean([share for _, share, moments in shares if moments]) > POOR
     assert min(share for _, share, moments in shares if moments) > 0.1
