@@ -75,6 +75,8 @@ def step(
     tracks = confirm(tracks, t, config)
     alive = lives(tracks, t, config)
     left = np.flatnonzero(taker == 0)
+    # Numbered by sensor, whichever scan of this time came first.
+    left = left[np.argsort(found.sensor[left], kind="stable")]
     new = confirm(born(found, left, t, first_id, tracks.scale.shape[1], config), t, config)
     taker[left] = new.track_id
     z = np.concatenate([z[alive], found.z[left]])
