@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jeat_graph.io.atomic import atomic_path
 
@@ -48,7 +48,7 @@ def plot_explanation(moments: Sequence[TrackMoment], title: str, path: Path) -> 
     below.set_ylabel("terms")
     below.set_xlabel("t (s)")
     below.legend(loc="best", fontsize=8)
-    settings = {"svg.hashsalt": "jeat-graph"}
+    settings: Any = {"svg.hashsalt": "jeat-graph"}
     metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     with mpl.rc_context(settings), atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=120, metadata=metadata.get(path.suffix.lower()))

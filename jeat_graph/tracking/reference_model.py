@@ -390,4 +390,5 @@ def _joined(parts: Sequence[ModelRows]) -> ModelRows:
 def _no_answer() -> Answer:
     """Return what is told before the first step."""
     nothing, whole = np.zeros(0), np.zeros(0, np.int64)
-    return Answer(_joined([]), np.zeros((0, 5 * _WIDTH)), whole, whole, (nothing, nothing, nothing))
+    states = np.zeros((0, 2 * STATES)), np.zeros((0, 2 * STATES**2))
+    return Answer(_joined([]), states, whole, whole, (nothing, nothing, nothing))

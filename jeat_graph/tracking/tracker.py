@@ -48,10 +48,10 @@ class Tracker(ModelTracker):
         Raises:
             ConfigError: no such engine.
         """
-        engine = as_config(config).tracker.engine if engine is None else engine
-        if engine not in ENGINES:
-            raise ConfigError(f"engine is one of {', '.join(ENGINES)}, not {engine!r}")
-        if engine == "paper":
+        name = as_config(config).tracker.engine if engine is None else engine
+        if name not in ENGINES:
+            raise ConfigError(f"engine is one of {', '.join(ENGINES)}, not {name!r}")
+        if name == "paper":
             from jeat_graph.tracking.paper.tracker import PaperTracker
 
             # It has the methods of a tracker, or says that it lacks one: for callers' types it is one.
@@ -68,5 +68,5 @@ class Tracker(ModelTracker):
         constants: ModelConstants | None = None,
     ) -> None:
         config = as_config(config)
-        engine = config.tracker.engine if engine is None else engine
-        super().__init__(config, image=image, diagnostics=diagnostics, engine=engine, constants=constants)
+        name = config.tracker.engine if engine is None else engine
+        super().__init__(config, image=image, diagnostics=diagnostics, engine=name, constants=constants)

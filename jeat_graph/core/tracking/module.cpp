@@ -138,7 +138,7 @@ public:
         visit_histories(writer, histories_);
         return Named(writer.out);
     }
-    void set_state(const nb::dict& state) {
+    void set_state(const Named& state) {
         StateReader reader(state);
         Moment read{State(now_.state.constants), {}};
         Histories histories = histories_;
