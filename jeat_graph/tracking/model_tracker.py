@@ -21,7 +21,6 @@ from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
-from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import singer
 from jeat_graph.filters.model_constants import ModelConstants
@@ -35,7 +34,7 @@ from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import StepBoxes, diagnostics_of, records_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
 from jeat_graph.tracking.model_tables import ClassNames, Places, in_order, table_of, with_classes
-from jeat_graph.tracking.prediction import Prediction, of_motion, predicted, still_there
+from jeat_graph.tracking.prediction import Prediction, of_motion, predicted, still_there, time_from
 from jeat_graph.tracking.reference_model import ModelRows, ReferenceModel
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
@@ -306,9 +305,7 @@ class ModelTracker(Updates, SavedModel):
             DataError: a time that is not finite.
             TimeOrderError: a time before that of the last step.
         """
-        t, now = time_of(t), self.time
-        if now is not None and t < now:
-            raise TimeOrderError(f"t = {t} s is before the last scan at {now} s: that is past")
+        t = time_from(t, self.time)
         rows = with_classes(self._model.rows(), self._classes, self._called)
         learnt = self._model.learnt()
         noise = singer.ProcessNoise(*learnt["process_noise"]), float(learnt["log_scene_variance"])

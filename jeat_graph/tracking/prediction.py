@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.errors import TimeOrderError
+from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.model_constants import ModelConstants
@@ -24,6 +27,23 @@ class Prediction(Trajectories):
     """
 
     cov: FloatArray = ()  # type: ignore[assignment]
+
+
+def time_from(t: Any, now: float | None) -> float:
+    """Return a time to predict to (s).
+
+    Args:
+        t: what a user gave.
+        now: time of the last step (s), or None before the first.
+
+    Raises:
+        DataError: a time that is not finite.
+        TimeOrderError: a time before that of the last step.
+    """
+    t = time_of(t)
+    if now is not None and t < now:
+        raise TimeOrderError(f"t = {t} s is before the last scan at {now} s: that is past")
+    return float(t)
 
 
 def predicted(

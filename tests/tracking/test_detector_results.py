@@ -125,9 +125,10 @@ def test_numbers_of_classes_are_those_that_came_in_whatever_is_seen():
     assert tracker.finish().take([0]).to_supervision().class_id.tolist() in ([2], [7])
 
 
-def test_names_without_numbers_keep_those_they_were_given_first():
+@pytest.mark.parametrize("preset", ["default", "paper"])
+def test_names_without_numbers_keep_those_they_were_given_first(preset):
     pytest.importorskip("supervision")
-    tracker = Tracker(image=IMAGE)
+    tracker = Tracker(preset, image=IMAGE)
     first: dict[str, int] = {}
     for k in range(40):
         names = ["van", "van", "bus"] if k < 20 else ["van", "car", "bus"]
@@ -172,9 +173,10 @@ def test_a_user_s_detections_come_back_with_the_tracks_that_took_them(tmp_path):
     assert len(nothing.to_supervision()) == 0
 
 
-def test_what_no_reported_track_took_has_minus_one():
+@pytest.mark.parametrize("preset", ["default", "paper"])
+def test_what_no_reported_track_took_has_minus_one(preset):
     sv = pytest.importorskip("supervision")
-    tracker = Tracker(image=IMAGE)
+    tracker = Tracker(preset, image=IMAGE)
     for k in range(20):
         table = tracker.update(
             sv.Detections(xyxy=XYXY[:2] + k, confidence=SCORES[:2]), t=k / 20, sensor="rgb"

@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
 from jeat_graph.config.paper import PaperConfig
 from jeat_graph.config.reading import as_config
@@ -17,21 +16,19 @@ from jeat_graph.config.schema import Config
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections, Scan
-from jeat_graph.data.embeddings import unit_embeddings
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
-from jeat_graph.data.interop import boxes_of
-from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.rig.common_picture import CommonPicture
-from jeat_graph.tracking.classes import ClassTally, Votes, check_names
+from jeat_graph.tracking.classes import ClassTally, Votes, check_names, number_classes
 from jeat_graph.tracking.paper.kalman import predict
 from jeat_graph.tracking.paper.smoothing import PaperSmoothers, StepTaken
 from jeat_graph.tracking.paper.state import Found, PaperTracks
 from jeat_graph.tracking.paper.step import step
 from jeat_graph.tracking.paper.table import predicted, table_of
-from jeat_graph.tracking.prediction import Prediction
+from jeat_graph.tracking.prediction import Prediction, time_from
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
+from jeat_graph.tracking.updates import Updates
 
 # Most sensors: the columns of `Trajectories.used` are the bits of a signed number.
 _MOST_SENSORS = 63
@@ -55,7 +52,7 @@ class PaperSnapshot(NamedTuple):
     sensor_names: tuple[str, ...]
 
 
-class PaperTracker:
+class PaperTracker(Updates):
     """Algorithm 1 of the paper over any number of sensors, with the settings of the section `paper`.
 
     Args:
@@ -89,6 +86,8 @@ class PaperTracker:
         self._t: float | None = None
         self._next_id = 1
         self._classes: ClassTally | None = None
+        self._class_ids: dict[str, int] = {}
+        self.logs_takers = True
         self._taker: IntArray = np.zeros(0, dtype=np.int64)
         self._looked: dict[str, float] = {}
         self._smoothers: PaperSmoothers | None = None
@@ -156,6 +155,7 @@ class PaperTracker:
         self._looked |= dict.fromkeys((scan.sensor for scan in batch), t)
         votes = Votes.of_batch(batch, np.arange(len(found), dtype=np.int64))
         if votes is not None or self._classes is not None:
+            self._class_ids = number_classes(self._class_ids, batch)
             tally = self._classes or ClassTally.start()
             self._classes = tally.after(taken.tracks.track_id, taken.taker, votes)
         if self._smoothers is None:
@@ -210,22 +210,6 @@ class PaperTracker:
         """Go back to a snapshot of this tracker."""
         self._t, self._next_id, self._tracks, self._classes, self.sensor_names = snapshot
 
-    def update(
-        self,
-        source: Any,
-        *,
-        t: float,
-        sensor: str,
-        scores: npt.ArrayLike | None = None,
-        classes: npt.ArrayLike | None = None,
-        embeddings: npt.ArrayLike | None = None,
-        format: str | None = None,
-    ) -> Trajectories:
-        """Take in what a detector returned for one picture; see `Tracker.update`. Embeddings are refused."""
-        found = boxes_of(source, scores, classes, format)
-        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
-        return self.step(Scan(t, sensor, found.boxes, found.scores, found.classes, looks))
-
     def run(self, detections: Detections) -> Iterator[Trajectories]:
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""
         for batch in detections.batches():
@@ -235,7 +219,7 @@ class PaperTracker:
         """Return the confirmed tracks as they are now."""
         t = 0.0 if self._t is None else self._t
         table = table_of(self._reported(), t, self.config, self.sensor_names, self._classes)
-        return replace(table, instants=None if self._t is None else np.array([t]))
+        return self._numbered(replace(table, instants=None if self._t is None else np.array([t])))
 
     def predict(self, t: float) -> Prediction:
         """Say where the confirmed tracks will be at a time, and how surely; the tracker stays as it is.
@@ -247,9 +231,7 @@ class PaperTracker:
             DataError: a time that is not finite.
             TimeOrderError: a time before that of the last step.
         """
-        t = time_of(t)
-        if self._t is not None and t < self._t:
-            raise TimeOrderError(f"t = {t} s is before the last scan at {self._t} s: that is past")
+        t = time_from(t, self._t)
         dt = 0.0 if self._t is None else t - self._t
         tracks = predict(self._reported(), dt, self._settings)
         return predicted(tracks, t, self.config, self.sensor_names, self._classes)
@@ -260,7 +242,7 @@ class PaperTracker:
         Raises:
             JeatGraphError: the configuration asks for no smoother.
         """
-        return self._wanted_smoothers().smoothed(self.sensor_names)
+        return self._numbered(self._wanted_smoothers().smoothed(self.sensor_names))
 
     def drain_smoothed(self) -> Trajectories:
         """Return the smoothed rows that are final and forget them.
@@ -268,7 +250,7 @@ class PaperTracker:
         Raises:
             JeatGraphError: the configuration asks for no smoother.
         """
-        return self._wanted_smoothers().drain(self.sensor_names)
+        return self._numbered(self._wanted_smoothers().drain(self.sensor_names))
 
     def settle(self) -> None:
         """Do nothing: no smoother works behind."""
@@ -279,7 +261,7 @@ class PaperTracker:
         if self._smoothers is not None and not self._finished:
             rows = self._smoothers.finish(self.sensor_names)
         self._finished = True
-        return rows
+        return self._numbered(rows)
 
     def sensor_states(self) -> dict[str, SensorState]:
         """Return the mean factor on each sensor's noise, by name; the paper learns nothing else of them."""
@@ -307,6 +289,10 @@ class PaperTracker:
         if self._smoothers is None:
             raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
         return self._smoothers
+
+    def _numbered(self, table: Trajectories) -> Trajectories:
+        """Return a table with the numbers of its classes."""
+        return replace(table, class_ids=self._class_ids or None)
 
     def _reported(self) -> PaperTracks:
         return self._tracks.take(self._tracks.confirmed)
