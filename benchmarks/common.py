@@ -65,13 +65,6 @@ def measure_or_read(
     return 0
 
 
-def over_seeds(count: int) -> str:
-    """How the numbers of a simulated table come about."""
-    if count == 1:
-        return "one seed"
-    return f"mean of {count} seeds (± standard deviation over them)"
-
-
 def publish(
     args: argparse.Namespace, name: str, result: Mapping[str, Any], tables: Mapping[str, Table]
 ) -> None:

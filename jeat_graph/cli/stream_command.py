@@ -314,15 +314,12 @@ def _take(
     session: Session, message: ScanMessage, place: str, bad: Callable[[DataError], None] | None
 ) -> None:
     """Take a message; errors get the place where it came from."""
-    from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
+    from jeat_graph.live.session import MESSAGE_ERRORS, of_message
 
     try:
         session.accept(message, place)
-    except (DataError, UnknownSensorError, TimeOrderError) as error:
-        if isinstance(error, DataError) and error.path is not None:
-            raise  # of a file that is written, not of the message
-        name, _, line = place.removesuffix(": ").rpartition(":")
-        trouble = DataError(str(error), name, int(line))
+    except MESSAGE_ERRORS as error:
+        trouble = of_message(error, place)
         if bad is None:
             raise trouble from None
         bad(trouble)

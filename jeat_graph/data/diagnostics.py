@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 
 #: Degrees of freedom of `Diagnostics.nis`: the centre's two coordinates.
@@ -49,34 +49,6 @@ class Diagnostics:
 
     def __len__(self) -> int:
         return len(self.t)
-
-    @staticmethod
-    def from_log(
-        t: float, rows: RecordArray, living: IntArray, existence: FloatArray, sensors: tuple[str, ...]
-    ) -> Diagnostics:
-        """Read one step off the update log.
-
-        Args:
-            t: time of the step (s).
-            rows: (N,) the log's records in use (`filters.measurement.MEASUREMENT`).
-            living: (K,) identities of the tracks after the step, ascending.
-            existence: (K,) their probabilities of being vehicles.
-            sensors: names of the sensors.
-        """
-        ids = rows["track_id"].copy()
-        now = np.full(len(ids), np.nan)
-        if len(living):
-            place = np.minimum(np.searchsorted(living, ids), len(living) - 1)
-            now = np.where(living[place] == ids, existence[place], np.nan)
-        return Diagnostics(
-            t=np.full(len(ids), t),
-            track_id=ids,
-            sensor=rows["sensor"].copy(),
-            nis=rows["nis"].copy(),
-            noise_scale=rows["scale"].copy(),
-            existence=now,
-            sensors=sensors,
-        )
 
     @staticmethod
     def concatenate(parts: Sequence[Diagnostics]) -> Diagnostics:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from jeat_graph.config.reading import config_to_dict
+from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError, UnknownSensorError
 from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.counts import Counts, count_lines
@@ -23,6 +24,24 @@ from jeat_graph.version import __version__
 
 #: Smoothed rows are fetched, and the sensors judged, at one arrival in so many.
 ARRIVALS_PER_DRAIN = 32
+#: What may be wrong with the scans of a message.
+MESSAGE_ERRORS = (DataError, UnknownSensorError, TimeOrderError)
+
+
+def of_message(error: JeatGraphError, place: str) -> DataError:
+    """Return what is wrong with a message, and where it came from.
+
+    Args:
+        error: of `MESSAGE_ERRORS`.
+        place: NAME:NUMBER of the message.
+
+    Raises:
+        DataError: `error`, if it is of a file that is written, not of the message.
+    """
+    if isinstance(error, DataError) and error.path is not None:
+        raise error
+    name, _, line = place.removesuffix(": ").rpartition(":")
+    return DataError(str(error), name, int(line))
 
 
 class RowsEnd(Protocol):

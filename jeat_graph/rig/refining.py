@@ -48,7 +48,6 @@ _PRIOR_OFFSET_S, _PRIOR_DRIFT_PPM = 0.5, 30.0
 _PPM = 1e-6
 # First guesses of velocity and acceleration are uncertain by so many sizes a second, and a second squared.
 _START = np.array([2.0, 20.0, 100.0])
-_LARGE_PX = 1e-3
 
 
 class Refined(NamedTuple):

@@ -26,21 +26,3 @@ def scale(size: int) -> FloatArray:
 def unscale_mean(vectors: FloatArray, reference: FloatArray) -> FloatArray:
     """Turn GTSAM's vectors (..., 2 n) into means (..., 2, n) in px and s, given their reference."""
     return np.asarray(vectors.reshape(reference.shape) / scale(reference.shape[-1]) + reference)
-
-
-def unscale_cov(blocks: FloatArray) -> FloatArray:
-    """Turn the axes' covariances (..., n, n) of scaled states into those in px and s."""
-    D = scale(blocks.shape[-1])
-    return np.asarray(blocks / (D[:, None] * D))
-
-
-def axis_blocks(matrices: FloatArray) -> FloatArray:
-    """Return the two diagonal blocks (..., 2, n, n) of matrices (..., 2 n, 2 n); the rest is zero."""
-    n = matrices.shape[-1] // 2
-    return np.stack([matrices[..., :n, :n], matrices[..., n:, n:]], axis=-3)
-
-
-def unscale_gain(gain: FloatArray) -> FloatArray:
-    """Turn smoother gains (..., n, n) between scaled states into those between states in px and s."""
-    D = scale(gain.shape[-1])
-    return np.asarray(gain * (D / D[:, None]))

@@ -14,42 +14,17 @@ def make(folder: Path) -> Path:
     if shutil.which("openssl") is None:
         pytest.skip("openssl is not installed")
 
-    def openssl(*arguments: str) -> None:
-        subprocess.run(["openssl", *arguments], cwd=folder, check=True, capture_output=True)
+    def openssl(command: str, *rest: str) -> None:
+        subprocess.run(["openssl", *command.split(), *rest], cwd=folder, check=True, capture_output=True)
+
+    def key(name: str) -> str:
+        return f"-newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -keyout {name}.key"
 
     for name in ("ca", "other"):
-        key = (
-            "-newkey",
-            "ec",
-            "-pkeyopt",
-            "ec_paramgen_curve:prime256v1",
-            "-nodes",
-            "-keyout",
-            f"{name}.key",
-        )
-        openssl("req", "-x509", *key, "-out", f"{name}.pem", "-days", "30", "-subj", f"/CN=jeat-graph {name}")
+        openssl(f"req -x509 {key(name)} -out {name}.pem -days 30 -subj", f"/CN=jeat-graph {name}")
     (folder / "names.txt").write_text("subjectAltName=IP:127.0.0.1,DNS:localhost\n")
     for name in ("server", "client"):
-        key = (
-            "-newkey",
-            "ec",
-            "-pkeyopt",
-            "ec_paramgen_curve:prime256v1",
-            "-nodes",
-            "-keyout",
-            f"{name}.key",
-        )
-        openssl("req", *key, "-out", f"{name}.csr", "-subj", f"/CN={name}")
-        signed = (
-            "-CA",
-            "ca.pem",
-            "-CAkey",
-            "ca.key",
-            "-CAcreateserial",
-            "-days",
-            "30",
-            "-out",
-            f"{name}.pem",
-        )
-        openssl("x509", "-req", "-in", f"{name}.csr", *signed, "-extfile", "names.txt")
+        openssl(f"req {key(name)} -out {name}.csr -subj /CN={name}")
+        signed = f"-CA ca.pem -CAkey ca.key -CAcreateserial -days 30 -out {name}.pem"
+        openssl(f"x509 -req -in {name}.csr {signed} -extfile names.txt")
     return folder

@@ -6,6 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 from jeat_graph.data.errors import ConfigError, JeatGraphError
@@ -101,13 +102,9 @@ def open_sinks(
             sinks.add_stdout()
             continue
         url = full_url(one.url, one.password_file, one.tls)
-        notices = Notices(log.say)
-        end = EndStatus(str(sink_address(url)), notices)
+        end = EndStatus(str(sink_address(url)), Notices(log.say))
         status.sinks.append(end)
-
-        def open_it(url: str = url, notices: Notices = notices) -> Sink:
-            return open_sink(url, overdue, notices=notices)
-
+        open_it = partial(open_sink, url, overdue, notices=end.notices)
         opened = _until_opened(open_it, end, log, stop, status)
         if opened is not None:
             sinks.add(opened, one.encoding, end)
@@ -123,13 +120,9 @@ def open_sources(
         if one.url is None:
             continue
         url = full_url(one.url, one.password_file, one.tls)
-        notices = Notices(log.say)
-        end = EndStatus(str(source_address(url)), notices)
+        end = EndStatus(str(source_address(url)), Notices(log.say))
         status.sources.append(end)
-
-        def open_it(url: str = url, notices: Notices = notices) -> Source:
-            return open_source(url, overdue, notices=notices)
-
+        open_it = partial(open_source, url, overdue, notices=end.notices)
         opened = _until_opened(open_it, end, log, stop, status)
         if opened is not None:
             found.append(OpenedSource(opened, end))

@@ -11,7 +11,7 @@ from typing import Any
 
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
-from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError, TimeOrderError, UnknownSensorError
+from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.locking import hold_file
 from jeat_graph.io.scan_batch import ScanBatch
@@ -26,13 +26,13 @@ from jeat_graph.live.service.log import ERROR, INFO, Log
 from jeat_graph.live.service.status import RUNNING, STOPPING, Status
 from jeat_graph.live.service.systemd import Watchdog, notify
 from jeat_graph.live.service.web import Web
-from jeat_graph.live.session import Ends, Session
+from jeat_graph.live.session import MESSAGE_ERRORS, Ends, Session, of_message
 from jeat_graph.live.smoothed_file import SmoothedFile
 from jeat_graph.live.told import BadLines
 from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.tracking.tracker import Tracker
 
-#: How long one source is waited for, alone or beside others (s).
+#: Timeout of a receive (s): of the only source, and of one of several.
 _ALONE_S, _BESIDE_S = 0.2, 0.05
 #: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
 _COMMIT_PART = 0.5
@@ -257,11 +257,8 @@ class Service:
         before = session.duplicates
         try:
             session.accept(message, place)
-        except (DataError, UnknownSensorError, TimeOrderError) as error:
-            if isinstance(error, DataError) and error.path is not None:
-                raise  # of a file that is written, not of the message
-            name, _, line = place.removesuffix(": ").rpartition(":")
-            self._bad(DataError(str(error), name, int(line)), running)
+        except MESSAGE_ERRORS as error:
+            self._bad(of_message(error, place), running)
         counted.duplicates = session.duplicates
         if session.duplicates == before:
             self.status.came(message.batch.scans)
