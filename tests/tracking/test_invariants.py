@@ -71,8 +71,8 @@ def test_any_scans_give_finite_tables_and_sane_states(preset, examples):
 
     seen = {"born": 0, "rows": 0}
     holds()
-    # All of it would hold for a tracker that never reports anything. How many it reports is for the recordings to say,
-    # and which are drawn is for the version of Hypothesis.
+    # All of it would hold for a tracker that never reports anything. How many rows there are depends on the
+    # recordings, and which are drawn on the version of Hypothesis.
     assert seen["born"] > 0
     assert seen["rows"] > 0
 
