@@ -96,7 +96,7 @@ def build_frames(
             interpolates (`resampling.interpolate_to`).
         max_age_s: for `causal`, how far to predict.
         max_gap_s: for `smoothed`, how far apart joined rows may be.
-        instants: for `causal`, all times at which the tracker gave output, if known.
+        instants: all times at which the tracker ran, if known.
         outside: whether rows before the first and after the last frame of the truth make frames of their
             own, in which nothing is to be found (`resampling.rows_outside`).
 
@@ -110,7 +110,7 @@ def build_frames(
     if kind == "causal":
         tracks = predict_to(table, times, max_age_s=max_age_s, instants=instants)
     else:
-        tracks = interpolate_to(table, times, max_gap_s=max_gap_s)
+        tracks = interpolate_to(table, times, max_gap_s=max_gap_s, instants=instants)
     beyond = rows_outside(table, times, instants) if outside else np.zeros(0, dtype=np.int64)
     if len(beyond):
         times, tracks = with_rows(tracks, times, table, beyond)

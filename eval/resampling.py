@@ -173,6 +173,16 @@ def on_the_clock_of(table: Trajectories, times: FloatArray) -> bool:
     return bool(apart.all() and np.median(np.diff(own)) < 1.5 * frame_s)
 
 
+def _rows_at_each(t: FloatArray, track_id: IntArray, instants: FloatArray) -> bool:
+    """Whether rows of tracks (N,) lie at the tracker's times, mostly one step from one to the next."""
+    ticks = np.unique(instants)
+    place = np.searchsorted(ticks, t - TIME_TOLERANCE_S)
+    if (np.abs(ticks[np.minimum(place, len(ticks) - 1)] - t) > TIME_TOLERANCE_S).any():
+        return False
+    steps = np.diff(place)[np.diff(track_id) == 0]
+    return bool(len(steps)) and float(np.median(steps)) == 1.0
+
+
 def _gather(table: Trajectories, row: IntArray, frame: IntArray, age: FloatArray) -> Resampled:
     mean = np.nan_to_num(table.mean[row])
     dt = age[:, None]
@@ -189,11 +199,18 @@ def _gather(table: Trajectories, row: IntArray, frame: IntArray, age: FloatArray
     )
 
 
-def interpolate_to(table: Trajectories, times: FloatArray, *, max_gap_s: float | None = None) -> Resampled:
+def interpolate_to(
+    table: Trajectories,
+    times: FloatArray,
+    *,
+    max_gap_s: float | None = None,
+    instants: FloatArray | None = None,
+) -> Resampled:
     """Smoothed trajectories at given times, between the two neighbouring rows of each track.
 
     Nothing is said before a track's first row or after its last, nor at a time at which others have a row and
-    it has none: then it is known not to be reported. The centre follows the quintic through
+    it has none: then it is known not to be reported. The same holds for the times at which the tracker ran,
+    if the table is one that has rows at each of these. The centre follows the quintic through
     position, velocity and acceleration of both rows, which is the mean of the white-jerk motion model
     between two known states (Barfoot, State Estimation for Robotics, ch. 11); a track without known motion
     moves in a straight line. The box keeps its offset from the centre (it may be clipped) and its log size
@@ -203,16 +220,23 @@ def interpolate_to(table: Trajectories, times: FloatArray, *, max_gap_s: float |
         table: rows in any order, at most one a track and time.
         times: (T,) ascending (s).
         max_gap_s: rows further apart than this are not joined; any gap is bridged by default.
+        instants: (I,) all the times at which the tracker ran, if known.
     """
     order = np.lexsort((table.t, table.track_id))
     t = table.t[order]
+    moments, at_each = np.unique(t), False
+    if instants is not None and len(t):
+        at_each = _rows_at_each(t, table.track_id[order], instants)
+        near = np.searchsorted(moments, instants - TIME_TOLERANCE_S)
+        other = moments[np.minimum(near, len(moments) - 1)] - instants
+        if at_each:
+            moments = np.unique(np.concatenate((moments, instants[np.abs(other) > TIME_TOLERANCE_S])))
     _, first, count = np.unique(table.track_id[order], return_index=True, return_counts=True)
     begin = np.searchsorted(times, t[first] - TIME_TOLERANCE_S, side="left")
     end = np.searchsorted(times, t[first + count - 1] + TIME_TOLERANCE_S, side="right")
     track, frame = expand_ranges(begin.astype(np.int64), (end - begin).astype(np.int64))
 
     # One search over all tracks: rank the times, and let (track, rank) be a single ascending number.
-    moments = np.unique(t)
     rank = np.searchsorted(moments, t)
     row_key = np.repeat(np.arange(len(first)), count) * len(moments) + rank
     now = np.searchsorted(moments, times[frame] + TIME_TOLERANCE_S, side="right") - 1
@@ -223,7 +247,8 @@ def interpolate_to(table: Trajectories, times: FloatArray, *, max_gap_s: float |
     step = t[after] - t[before]
     into = np.clip(times[frame] - t[before], 0.0, step)
     told = np.abs(moments[np.maximum(now, 0)] - times[frame]) <= TIME_TOLERANCE_S
-    ok = ~told | (into <= TIME_TOLERANCE_S) | (step - into <= TIME_TOLERANCE_S)
+    apart = told | (rank[after] - rank[before] > 1 if at_each else False)
+    ok = ~apart | (into <= TIME_TOLERANCE_S) | (step - into <= TIME_TOLERANCE_S)
     if max_gap_s is not None:
         ok &= (step <= max_gap_s + TIME_TOLERANCE_S) | (into <= TIME_TOLERANCE_S)
     ok_rows = np.flatnonzero(ok)

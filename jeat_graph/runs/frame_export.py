@@ -36,7 +36,8 @@ def at_frames(table: Trajectories, kind: Kind, instants: FloatArray, rate_hz: fl
     first = np.ceil((instants[0] - TIME_TOLERANCE_S) * rate_hz)
     last = np.floor((instants[-1] + 0.5 / rate_hz) * rate_hz)
     times = np.arange(first, last + 1) / rate_hz
-    at = predict_to(table, times, instants=instants) if kind == "causal" else interpolate_to(table, times)
+    resample = predict_to if kind == "causal" else interpolate_to
+    at = resample(table, times, instants=instants)
     return dataclasses.replace(
         table.take(at.row), t=times[at.frame], boxes=at.boxes, mean=at.mean, var=at.var
     )

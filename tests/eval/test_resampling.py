@@ -132,6 +132,19 @@ def test_tracks_do_not_mix_and_none_is_extended_beyond_its_rows():
     np.testing.assert_allclose(out.mean, expected, atol=1e-9)
 
 
+def test_where_the_tracker_ran_and_gave_a_track_no_row_the_track_is_not_there():
+    ticks = np.arange(0.0, 1.05, 0.1)
+    table = curved(ticks[[0, 1, 2, 3, 7, 8, 9]], 1)
+    times = np.array([0.05, 0.3, 0.35, 0.4, 0.55, 0.65, 0.7, 0.75])
+    assert interpolate_to(table, times, instants=ticks + 1e-9).frame.tolist() == [0, 1, 6, 7]
+    assert interpolate_to(table, times).frame.tolist() == list(range(8))
+    # A table at times of its own, or at every second step, says nothing by having no row in between.
+    for own in (ticks[::2], ticks + 0.03):
+        assert interpolate_to(curved(own, 1), times, instants=ticks).frame.tolist() == [
+            k for k, t in enumerate(times) if own[0] <= t <= own[-1]
+        ]
+
+
 def test_the_size_is_interpolated_in_its_logarithm():
     table = make_tracks([0.0, 1.0], [1, 1], [[0, 0, 10, 10], [0, 0, 40, 10]])
     assert interpolate_to(table, np.array([0.5])).boxes[0, 2] == pytest.approx(20.0)

@@ -80,10 +80,8 @@ class TracksAt:
     ) -> None:
         self._times = times
         self._trail_s = trail_s
-        if kind == "causal":
-            self._found: Resampled = predict_to(table, times, instants=instants)
-        else:
-            self._found = interpolate_to(table, times)
+        resample = predict_to if kind == "causal" else interpolate_to
+        self._found: Resampled = resample(table, times, instants=instants)
         self._start = np.searchsorted(self._found.frame, np.arange(len(times) + 1))
         order = np.argsort(table.t, kind="stable")
         self._row_t, self._row_id = table.t[order], table.track_id[order]

@@ -118,7 +118,7 @@ class _Paired:
 
     def __init__(self, causal: Trajectories, smoothed: Trajectories) -> None:
         times = np.unique(causal.t)
-        found = interpolate_to(smoothed, times)
+        found = interpolate_to(smoothed, times, instants=causal.instants)
         self._t = times[found.frame]
         self._mean, self._var = found.mean, found.var
         self._rows = rows_of_tracks(found.track_id, self._t)
