@@ -242,7 +242,7 @@ class ModelConstants:
     doubtful_gap_s: float = 1.0
     false_posterior: float = 0.05
     false_gap_s: float = 0.1
-    least_presence: float = 0.05
+    least_presence: float = 0.02
     outside_share: float = 0.1
     outside_gap_s: float = 0.2
     learn_period_s: float = 0.5

@@ -219,6 +219,29 @@ def test_a_vehicle_whose_box_is_cut_for_a_second_keeps_its_track(side, left_over
     assert len(ids) == 1
 
 
+@pytest.mark.parametrize("rate_hz", [10.0, 20.0, 100.0])
+@pytest.mark.parametrize("speed", [40.0, 120.0])
+def test_a_vehicle_that_nobody_sees_for_two_seconds_keeps_its_identity_if_it_goes_straight_on(rate_hz, speed):
+    rng = np.random.default_rng(2)
+    made, ids = tracker(), set()
+    for k in range(int(10 * rate_hz)):
+        t = k / rate_hz
+        hidden = 5.0 <= t < 7.0
+        found = [
+            [100.0 + speed * t + rng.normal(0, 1.5), y + rng.normal(0, 1.5), 60.0, 40.0]
+            for y in (100.0, 400.0)
+            if not (hidden and y == 100.0)
+        ]
+        table = made.step((t, "rgb", found, rng.uniform(0.6, 0.95, len(found))))
+        ids |= set(table.track_id.tolist())
+        # It is no longer reported where it is not seen, and reported again at once.
+        if t >= 2.0 and not 5.0 <= t < 7.3:
+            assert len(table) == 2, t
+        if 6.0 <= t < 6.9:
+            assert len(table) == 1, t
+    assert ids == {1, 2}
+
+
 # What must change nothing.
 
 
