@@ -32,6 +32,7 @@ class Evidence(ArrayTable):
 
     Attributes:
         hits, misses: (N, S) in correlation times.
+        stationary_hits, stationary_misses: (N, S) those of them while the track stood.
         found: (N, S) whether the sensor has ever found it.
         recent, recent_weight: (N, S) sum of logits over a few scans, and its weight.
         peak: (N, S) decaying peak of the logits.
@@ -44,11 +45,16 @@ class Evidence(ArrayTable):
     """
 
     PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
-        ("hits", "misses", "found", "recent", "recent_weight", "peak", "total", "total_weight")
+        (
+            *("hits", "misses", "stationary_hits", "stationary_misses", "found"),
+            *("recent", "recent_weight", "peak", "total", "total_weight"),
+        )
     )
 
     hits: FloatArray
     misses: FloatArray
+    stationary_hits: FloatArray
+    stationary_misses: FloatArray
     found: BoolArray
     recent: FloatArray
     recent_weight: FloatArray
@@ -71,7 +77,7 @@ class Evidence(ArrayTable):
         per_sensor, one = np.zeros((0, sensors)), np.zeros(0)
         whole, truth = np.zeros(0, dtype=np.int64), np.zeros((0, sensors), dtype=np.bool_)
         logits = per_sensor, per_sensor, per_sensor, per_sensor, per_sensor
-        return cls(per_sensor, per_sensor, truth, *logits, one, one, one, whole, one, one)
+        return cls(*(per_sensor,) * 4, truth, *logits, one, one, one, whole, one, one)
 
     @classmethod
     def of_births(
@@ -88,8 +94,8 @@ class Evidence(ArrayTable):
             weight: of one detection, in correlation times.
         """
         number = len(logits)
-        columns = [np.zeros((number, sensors)) for _ in range(7)]
-        hits, misses, recent, recent_weight, peak, total, total_weight = columns
+        counts = [np.zeros((number, sensors)) for _ in range(4)]
+        recent, recent_weight, peak, total, total_weight = (np.zeros((number, sensors)) for _ in range(5))
         found = np.zeros((number, sensors), dtype=np.bool_)
         found[:, sensor] = True
         recent[:, sensor] = total[:, sensor] = logits * weight
@@ -98,7 +104,7 @@ class Evidence(ArrayTable):
         scores = (recent, recent_weight, peak, total, total_weight)
         owner, time = np.full(number, sensor, dtype=np.int64), np.full(number, t)
         return cls(
-            hits, misses, found, *scores, overlap, np.zeros(number), np.ones(number), owner, time, time.copy()
+            *counts, found, *scores, overlap, np.zeros(number), np.ones(number), owner, time, time.copy()
         )
 
 
@@ -108,6 +114,7 @@ def count_hits(
     sensor: int,
     logits: FloatArray,
     gain: FloatArray,
+    stationary: BoolArray,
     clock: ScanClock,
     c: ModelConstants,
 ) -> Evidence:
@@ -119,6 +126,7 @@ def count_hits(
         sensor: index of the sensor.
         logits: (K,) of the scores.
         gain: (K,) log likelihood of each detection against noise.
+        stationary: (K,) which of the tracks stood.
         clock: of the sensor's scan.
         c: constants.
     """
@@ -126,6 +134,7 @@ def count_hits(
     at = (rows, sensor)
     first = (new.hits[at] <= 0.0) & (new.owner[rows] != sensor)
     new.hits[at] += clock.weight
+    new.stationary_hits[at] += clock.weight * stationary
     new.found[at] = True
     for total, weight, memory in (
         (new.recent, new.recent_weight, c.smoothing_s),
@@ -145,9 +154,19 @@ def count_hits(
 
 
 def count_misses(
-    evidence: Evidence, rows: IntArray, sensor: int, visible: FloatArray, weight: float
+    evidence: Evidence, rows: IntArray, sensor: int, visible: FloatArray, stationary: BoolArray, weight: float
 ) -> Evidence:
-    """Return the evidence after a sensor missed some tracks (K,), visible with a probability (K,)."""
-    misses = evidence.misses.copy()
+    """Return the evidence after a sensor missed some tracks (K,).
+
+    Args:
+        evidence: before.
+        rows: (K,) tracks that were missed.
+        sensor: index of the sensor.
+        visible: (K,) probability that they were visible.
+        stationary: (K,) which of them stood.
+        weight: of a look, in correlation times.
+    """
+    misses, of_stationary = evidence.misses.copy(), evidence.stationary_misses.copy()
     misses[rows, sensor] += weight * visible
-    return replace(evidence, misses=misses)
+    of_stationary[rows, sensor] += weight * visible * stationary
+    return replace(evidence, misses=misses, stationary_misses=of_stationary)

@@ -80,6 +80,10 @@ class ModelConstants:
         unseen_bounds: of the learnt share: "the one never sees it" and "the other invents it" explain the
             same data, so the share is bounded; few objects of a sort teach that there are none, so it does
             not fall below its prior.
+        stationary_speed: speed below which an object is taken to stand (sizes/s).
+        stationary_unseen_share: share of real objects that a sensor does not see while they stand. Prior; an
+            event camera teaches more.
+        stationary_unseen_bounds: of the learnt share.
         shared_false: share of persistent false objects that another sensor reports, too.
         noise_share: prior odds of noise that is seen once, as a probability. Prior.
         noise_bounds: of the learnt share.
@@ -193,6 +197,9 @@ class ModelConstants:
     chance_hit: float = 0.02
     unseen_share: float = 0.2
     unseen_bounds: tuple[float, float] = (0.2, 0.9)
+    stationary_speed: float = 0.3
+    stationary_unseen_share: float = 0.05
+    stationary_unseen_bounds: tuple[float, float] = (0.02, 0.8)
     shared_false: float = 0.3
     noise_share: float = 0.5
     noise_bounds: tuple[float, float] = (0.05, 0.95)

@@ -1,16 +1,18 @@
 """What a track is: the posterior over its hypotheses, and what is learnt of the sensors from it.
 
-- *real*: an object. Each sensor either sees it, with a P_D of its own (Beta), or never does (share g).
+- *real*: an object. Each sensor either sees it, with a P_D of its own (Beta), or never does (share g), or
+  not while it stands (share b of the rest), as an event camera.
 - *persistent false object of sensor s*: what s takes for one again and again, a window or a sign. s finds it
 as it
   finds objects; every other sensor finds it by chance, or (share c) has it in common.
 - *noise*: boxes of the moment. Every later detection where a track predicts it speaks against it.
 - *second box* of another track: no hypothesis of its own but a term in the odds of "real".
 
-With h hits and m misses in correlation times, BB their Beta-binomial, ch = ε^h (1 − ε)^m and η_s the log odds
-by score:
+With h hits and m misses in correlation times, BB their Beta-binomial, ch = ε^h (1 − ε)^m, BB' the first of
+those while it moved, ch' the second of those while it stood, and η_s the log odds by score:
 
-    ln w_real  = Σ_s ln[g_s ch + (1 − g_s) BB] + Σ_s η_s + k ln(1 − o) / (1 + e^(max η − η₀))
+    ln w_real  = Σ_s ln[g_s ch + (1 − g_s) (b_s BB' ch' + (1 − b_s) BB)] + Σ_s η_s
+                 + k ln(1 − o) / (1 + e^(max η − η₀))
     ln w_false = ln Σ_s exp(ln BB_s + Σ_{s' ≠ s} (ln[(1 − c) ch + c BB]_{s'} + π_{s'}))
     ln w_noise = ln ν/(1 − ν) − gained + Σ_{s ≠ first} π_s
 
@@ -49,6 +51,7 @@ class SensorBelief(NamedTuple):
     Attributes:
         p_detect: (S,) mean P_D of objects that it sees.
         unseen: (S,) share g of real objects that it never sees.
+        stationary_unseen: (S,) share b of the others that it does not see while they stand.
         indifference: (S,) a: logit + a is the log odds that a box is real.
         prior_odds: (S,) π: log odds that what it finds is real; shares how often "false" explains a find.
         noise_share: prior share ν of noise among what is not real.
@@ -56,6 +59,7 @@ class SensorBelief(NamedTuple):
 
     p_detect: FloatArray
     unseen: FloatArray
+    stationary_unseen: FloatArray
     indifference: FloatArray
     prior_odds: FloatArray
     noise_share: float
@@ -97,6 +101,7 @@ class Posterior(NamedTuple):
         log_odds: (N,) its log odds.
         noise: (N,) probability of noise, given that it is not real.
         unseen: (N, S) probability that a real object is one that the sensor never sees.
+        stationary_unseen: (N, S) that one which it sees is not seen while it stands.
         scores: (N, S) log odds by score, 0 where the sensor has not found it.
     """
 
@@ -104,13 +109,15 @@ class Posterior(NamedTuple):
     log_odds: FloatArray
     noise: FloatArray
     unseen: FloatArray
+    stationary_unseen: FloatArray
     scores: FloatArray
 
 
 def initial_sensor(c: ModelConstants) -> SensorBelief:
     """Return the model of one sensor before anything is learnt."""
     one = np.ones(1)
-    return SensorBelief(c.p_detect * one, c.unseen_share * one, 0.0 * one, 0.0 * one, c.noise_share)
+    shares = c.p_detect * one, c.unseen_share * one, c.stationary_unseen_share * one
+    return SensorBelief(*shares, 0.0 * one, 0.0 * one, c.noise_share)
 
 
 def beta_binomial(
@@ -143,7 +150,12 @@ def posterior(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> P
     not_real = np.logaddexp(np.logaddexp.reduce(w.false, axis=1), w.noise)
     log_odds = real - not_real
     return Posterior(
-        expit(log_odds), log_odds, np.exp(w.noise - not_real), np.exp(w.never - w.object_seen), w.scores
+        real=expit(log_odds),
+        log_odds=log_odds,
+        noise=np.exp(w.noise - not_real),
+        unseen=np.exp(w.never - w.object_seen),
+        stationary_unseen=np.exp(w.while_moving - w.at_times),
+        scores=w.scores,
     )
 
 
@@ -151,6 +163,8 @@ class _Weights(NamedTuple):
     """Logarithms of what the hypotheses weigh: (N, S) each, but second_box and noise (N,)."""
 
     seen: FloatArray
+    while_moving: FloatArray
+    at_times: FloatArray
     never: FloatArray
     object_seen: FloatArray
     shared: FloatArray
@@ -164,9 +178,16 @@ class _Weights(NamedTuple):
 def _weights(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> _Weights:
     found, rows = evidence.found, np.arange(len(evidence))
     seen = beta_binomial(evidence.hits, evidence.misses, sensors.p_detect, c)
-    chance = evidence.hits * math.log(c.chance_hit) + evidence.misses * math.log1p(-c.chance_hit)
+    chance = _by_chance(evidence.hits, evidence.misses, c)
+    stood = evidence.stationary_hits, evidence.stationary_misses
+    moving = beta_binomial(evidence.hits - stood[0], evidence.misses - stood[1], sensors.p_detect, c)
+    while_moving = np.log(sensors.stationary_unseen) + moving + _by_chance(*stood, c)
+    at_times = np.logaddexp(while_moving, np.log1p(-sensors.stationary_unseen) + seen)
+    # Who never stood is one that it sees, or does not.
+    told = stood[0] + stood[1] > 0.0
+    while_moving, at_times = np.where(told, while_moving, -np.inf), np.where(told, at_times, seen)
     never = np.log(sensors.unseen) + chance
-    object_seen = np.logaddexp(never, np.log1p(-sensors.unseen) + seen)
+    object_seen = np.logaddexp(never, np.log1p(-sensors.unseen) + at_times)
     shared = np.logaddexp(math.log1p(-c.shared_false) + chance, math.log(c.shared_false) + seen)
     scores = score_log_odds(evidence, sensors, c)
     prior = np.where(found, sensors.prior_odds, 0.0)
@@ -175,7 +196,14 @@ def _weights(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> _W
     odds = math.log(sensors.noise_share / (1.0 - sensors.noise_share))
     noise = odds - evidence.gained + prior.sum(axis=1) - prior[rows, evidence.owner]
     second_box = duplicate_log_odds(evidence.overlap, scores, c)
-    return _Weights(seen, never, object_seen, shared, prior, scores, false, second_box, noise)
+    return _Weights(
+        seen, while_moving, at_times, never, object_seen, shared, prior, scores, false, second_box, noise
+    )
+
+
+def _by_chance(hits: FloatArray, misses: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return ln ch (N, S) of hits and misses (N, S) on what a sensor cannot see."""
+    return np.asarray(hits * math.log(c.chance_hit) + misses * math.log1p(-c.chance_hit))
 
 
 def log_odds_terms(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> LogOddsTerms:
@@ -214,16 +242,19 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
     if not len(evidence):
         return sensors
     looks = evidence.hits + evidence.misses
+    stood = evidence.stationary_hits + evidence.stationary_misses
     grown = (evidence.last_s > evidence.born_s) | (evidence.gained > 0.0)
     told = grown | (evidence.misses.sum(axis=1) > _LEAST_MISSES)
     trust = evidence.found * np.clip(evidence.detections / c.weight_hits, *c.weight_bounds)[:, None]
     for _ in range(_ROUNDS):
         belief = posterior(evidence, sensors, c)
         real = belief.real[:, None]
-        weight = (
-            real * (1.0 - belief.unseen) * np.minimum(1.0, c.looks_count / np.maximum(looks, _LEAST_WEIGHT))
-        )
-        p_detect = _share(weight * evidence.hits, weight * looks, c.p_detect, c.p_detect_count)
+        seen, blind = real * (1.0 - belief.unseen), belief.stationary_unseen
+        weight = seen * np.minimum(1.0, c.looks_count / np.maximum(looks, _LEAST_WEIGHT))
+        hits = weight * (evidence.hits - blind * evidence.stationary_hits)
+        p_detect = _share(hits, weight * (looks - blind * stood), c.p_detect, c.p_detect_count)
+        weight = seen * (stood > _LEAST_LOOKS)
+        stationary = _share(weight * blind, weight, c.stationary_unseen_share, c.sensor_count)
         weight = real * (looks > _LEAST_LOOKS)
         unseen = _share(weight * belief.unseen, weight, c.unseen_share, c.sensor_count)
         false = (1.0 - belief.real)[told]
@@ -234,6 +265,7 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
         sensors = SensorBelief(
             p_detect=np.clip(p_detect, *c.p_detect_bounds),
             unseen=np.clip(unseen, *c.unseen_bounds),
+            stationary_unseen=np.clip(stationary, *c.stationary_unseen_bounds),
             indifference=sensors.indifference,
             prior_odds=np.log(odds),
             noise_share=float(np.clip(noise, *c.noise_bounds)),

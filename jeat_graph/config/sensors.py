@@ -9,7 +9,6 @@ from jeat_graph.data.errors import ConfigError
 
 # Numbers of a homography, and of one with parallax.
 _MATRICES = (9, 12)
-KINDS = ("any", "event")
 
 
 @dataclass(frozen=True)
@@ -32,9 +31,6 @@ class SensorConfig(Section):
         "Hz",
         "nominal rate of its scans, by which it counts as silent; tracking goes by their times alone",
         open_low=True,
-    )
-    kind: str = choice(
-        "any", KINDS, "event: it sees nothing that stands still; any: it sees what stands still as well"
     )
     even_score: float | None = number(
         None,

@@ -127,14 +127,14 @@ class SensorHealth:
             worst = max(
                 state.clutter / (CLUTTER_FACTOR * max(usual[0], LEAST_CLUTTER)),
                 state.noise_scale / (NOISE_FACTOR * usual[1]),
-                LEAST_REAL / max(state.trust, 1e-9),
+                LEAST_REAL / max(state.precision, 1e-9),
             )
             if worst >= 1.0 and name not in self.rubbish:
                 self.rubbish.append(name)
                 text = (
                     f"sensor {name!r} delivers rubbish: {state.clutter:.3g} false boxes a scan "
                     f"({usual[0]:.3g} usually), noise variance {state.noise_scale / usual[1]:.3g} times as "
-                    f"usual, {100.0 * state.trust:.2g} % of what it finds are real; it weighs less"
+                    f"usual, {100.0 * state.precision:.2g} % of what it finds are real; it weighs less"
                 )
                 events.append(HealthChange(now, name, RUBBISH, text))
             elif worst < AGAIN and name in self.rubbish:

@@ -71,8 +71,8 @@ class ModelTracker(Updates, SavedModel):
     Sensors have any names and are known from their first scan on. Boxes are reported up to the edge of the
     picture where `output.clip` says so and the detectors' end there, else as they are. Of the configuration
     it takes the size of the picture, if that was given, the smoother (with a fixed lag rows are final after
-    twice `smoother.lag_s`, else when their track has ended), and of a sensor its own picture, what kind it is
-    and at which score its boxes are as likely real as not.
+    twice `smoother.lag_s`, else when their track has ended), and of a sensor its own picture and at which
+    score its boxes are as likely real as not.
 
     Args:
         config: a configuration, the name of a preset, or of a YAML file.
@@ -381,7 +381,7 @@ class ModelTracker(Updates, SavedModel):
         return hypotheses_of(columns, learnt, self.constants, t, self.causal().track_id, self._looked)
 
     def sensor_states(self) -> dict[str, SensorState]:
-        """Return what has been learnt of each sensor that has looked, by name; lags are not told."""
+        """Return what has been learnt of each sensor that has looked, by name."""
         learnt = self._model.learnt()
         noise = np.exp(learnt["log_side_variance"]) / self.constants.side_std**2
         believed = 1.0 / (1.0 + np.exp(-learnt["prior_odds"]))
@@ -390,18 +390,15 @@ class ModelTracker(Updates, SavedModel):
             name: SensorState(
                 clutter=float(learnt["false_boxes"][k]),
                 p_detect=float(learnt["p_detect"][k]),
-                trust=float(believed[k]),
-                blind=0.0,
+                precision=float(believed[k]),
+                unseen=float(learnt["unseen"][k]),
+                stationary_unseen=float(learnt["stationary_unseen"][k]),
                 noise_scale=float(noise[k]),
                 offset_centre_share=(offsets[k][0], offsets[k][1]),
                 offset_log_size=(offsets[k][2], offsets[k][3]),
             )
             for k, name in enumerate(self._looked)
         }
-
-    def learnt(self) -> dict[str, SensorState]:
-        """Return what has been learnt of each sensor, as `sensor_states` does."""
-        return self.sensor_states()
 
     def _lag_s(self) -> float:
         if not self._smooths:
@@ -424,7 +421,7 @@ class ModelTracker(Updates, SavedModel):
         for name in new:
             said = self.config.sensors[name]
             even = math.nan if said.even_score is None else float(logit(np.array(said.even_score)))
-            self._model.declare_sensor(even, said.kind == "event")
+            self._model.declare_sensor(even)
             self._looked = (*self._looked, name)
         if new:
             self._find_places()

@@ -52,8 +52,6 @@ _PERIOD_MEMORY = 0.9
 _GAP_PERIODS, _LONGEST_PERIOD_S = 1.5, 0.1
 # Tracks that show the camera's motion: really there, with so many detections, the last so recent (s).
 _CAMERA_DETECTIONS, _CAMERA_AGE_S = 2, 0.5
-# What an event camera misses though it is there: what moves less than this in the picture (px/s).
-_LEAST_SPEED = 10.0
 # A pair that is possible is so however little it looks alike.
 _LEAST_GAIN = 1e-9
 
@@ -296,15 +294,16 @@ def count_hits_and_misses(
     """Write down what the sensor found and what it did not: evidence, the track's own P_D, presence."""
     tracks, k, hit = state.tracks, scan.sensor, pairs.track
     missed = np.setdiff1d(np.arange(len(tracks)), hit)
-    if state.sees_changes[k]:  # what stands still is not missed
-        missed = missed[np.linalg.norm(tracks.mean[missed, :, singer.VELOCITY], axis=1) >= _LEAST_SPEED]
+    stationary = is_stationary(tracks.mean, c)
+    # What stands may be missed because the sensor does not see it then.
+    p_detect = pairs.p_detect * np.where(stationary, 1.0 - state.sensors.stationary_unseen[k], 1.0)
     presence = tracks.presence.copy()
     visible = presence[missed, VISIBLE]
     presence[hit] = visibility.seen(len(hit))
-    presence[missed] = visibility.miss(presence[missed], pairs.p_detect[missed])
+    presence[missed] = visibility.miss(presence[missed], p_detect[missed])
     logits = scan.logits[pairs.box]
-    counted = evidence.count_hits(tracks.evidence, hit, k, logits, pairs.ratio, clock, c)
-    counted = evidence.count_misses(counted, missed, k, visible, clock.weight)
+    counted = evidence.count_hits(tracks.evidence, hit, k, logits, pairs.ratio, stationary[hit], clock, c)
+    counted = evidence.count_misses(counted, missed, k, visible, stationary[missed], clock.weight)
     keep = math.exp(-clock.weight * c.correlation_time_s / c.track_p_detect_memory_s)
     recent_hits, recent_misses, used = (
         tracks.recent_hits.copy(),
@@ -324,6 +323,13 @@ def count_hits_and_misses(
         recent_misses=recent_misses,
         used=used,
     )
+
+
+def is_stationary(mean: FloatArray, c: ModelConstants) -> BoolArray:
+    """Return which objects (N,) of states (N, 2, 7) stand, as far as is known."""
+    speed2 = (mean[:, :, singer.VELOCITY] ** 2).sum(axis=1)
+    area = np.exp(mean[:, :, singer.LOG_SIZE].sum(axis=1))
+    return np.asarray(speed2 < c.stationary_speed**2 * area)
 
 
 def count_clutter(

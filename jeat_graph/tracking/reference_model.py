@@ -103,9 +103,9 @@ class ReferenceModel:
         self._last: Step | None = None
         self._answer = _no_answer()
 
-    def declare_sensor(self, even_logit: float = math.nan, sees_changes: bool = False) -> None:
+    def declare_sensor(self, even_logit: float = math.nan) -> None:
         """Add a sensor that has not looked yet."""
-        declare_sensor(self._state, self.constants, even_logit, sees_changes)
+        declare_sensor(self._state, self.constants, even_logit)
 
     def take(
         self,

@@ -148,7 +148,6 @@ class ReferenceState:
         repetition: of S sensors, which boxes come again. `look`
         even_logit: (S,) logit of the score at which the user says that a box is as likely real as not; NaN
             where it is learnt.
-        sees_changes: (S,) whether the sensor sees changes alone, as an event camera does.
     """
 
     tracks: ReferenceTracks
@@ -172,7 +171,6 @@ class ReferenceState:
     boxes_beyond: FloatArray
     repetition: tuple[RepeatCounts, ...]
     even_logit: FloatArray
-    sees_changes: BoolArray
 
     @property
     def time(self) -> float:
@@ -203,7 +201,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         process_noise=singer.initial_process_noise(c),
         camera=camera_motion.initial_variance(c),
         gaps=gap_survival.no_gaps(),
-        sensors=SensorBelief(none, none, none, none, c.noise_share),
+        sensors=SensorBelief(*(none,) * 5, c.noise_share),
         ended=Evidence.none(0),
         learnt_s=-math.inf,
         offsets=sensor_offsets.no_offsets(),
@@ -216,17 +214,14 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         boxes_beyond=none,
         repetition=(),
         even_logit=none,
-        sees_changes=np.zeros(0, dtype=np.bool_),
     )
 
 
-def declare_sensor(
-    state: ReferenceState, c: ModelConstants, even_logit: float = math.nan, sees_changes: bool = False
-) -> None:
+def declare_sensor(state: ReferenceState, c: ModelConstants, even_logit: float = math.nan) -> None:
     """Add a sensor that has not looked yet, of which what is usual is believed but for what the user says."""
     new, old = object_probability.initial_sensor(c), state.sensors
     columns = [np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True)]
-    state.sensors = SensorBelief(columns[0], columns[1], columns[2], columns[3], old.noise_share)
+    state.sensors = SensorBelief(*columns, old.noise_share)
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
     state.offsets = sensor_offsets.widened(state.offsets)
     state.log_side_variance = np.append(state.log_side_variance, 2.0 * math.log(c.side_std))
@@ -238,4 +233,3 @@ def declare_sensor(
     state.boxes_beyond = np.append(state.boxes_beyond, 0.0)
     state.repetition = (*state.repetition, score_calibration.no_repetition())
     state.even_logit = np.append(state.even_logit, even_logit)
-    state.sees_changes = np.append(state.sees_changes, sees_changes)

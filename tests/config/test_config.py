@@ -109,7 +109,6 @@ def test_an_unknown_preset_names_the_nearest_one():
         ("sensors.evt.sigma_px=.nan", ["sensors.evt.sigma_px", "nan"]),
         ("sensors.evt.rate_hz=.inf", ["sensors.evt.rate_hz", "inf"]),
         ("sensors.evt.rate_hz=0", ["sensors.evt.rate_hz", "(0.0, 1e+16]", "(Hz)"]),
-        ("sensors.evt.kind=events", ["sensors.evt.kind", "events", "any", "event"]),
         ("smoother.lag_s=-1", ["smoother.lag_s", "-1.0", "(0.0, 1e+16]"]),
         ("smoother.lag_s=long", ["smoother.lag_s", "number", "long"]),
         ("smoother.lag_s=true", ["smoother.lag_s", "number"]),

@@ -19,8 +19,11 @@ from jeat_graph.filters.model_constants import ModelConstants
 C = ModelConstants()
 
 
-def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detections=5):
-    """Evidence of one track: hits, misses (S,) in correlation times; logits (S,), NaN where never found."""
+def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detections=5, stood=0.0):
+    """Evidence of one track: hits, misses (S,) in correlation times; logits (S,), NaN where never found.
+
+    stood: share (S,) of the hits and misses while it stood.
+    """
     scores = np.asarray(scores, dtype=float)
     found = ~np.isnan(scores)
     logits = np.where(found, scores, 0.0)[None]
@@ -28,6 +31,8 @@ def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detectio
     return Evidence(
         hits=np.array([hits], dtype=float),
         misses=np.array([misses], dtype=float),
+        stationary_hits=np.array([hits], dtype=float) * stood,
+        stationary_misses=np.array([misses], dtype=float) * stood,
         found=found[None],
         recent=logits,
         recent_weight=weight,
@@ -43,8 +48,11 @@ def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detectio
     )
 
 
-def sensors_of(number, p_detect=0.7, unseen=0.1, indifference=-1.0, prior_odds=0.3, noise=0.5):
-    rows = [np.full(number, value) for value in (p_detect, unseen, indifference, prior_odds)]
+def sensors_of(
+    number, p_detect=0.7, unseen=0.1, indifference=-1.0, prior_odds=0.3, noise=0.5, stationary_unseen=0.3
+):
+    values = (p_detect, unseen, stationary_unseen, indifference, prior_odds)
+    rows = [np.full(number, value) for value in values]
     return op.SensorBelief(*rows, noise_share=noise)
 
 
@@ -60,14 +68,27 @@ def enumerated(evidence, sensors):
     hits, misses, found = evidence.hits[0], evidence.misses[0], evidence.found[0]
     seen = [marginal(hits[s], misses[s], sensors.p_detect[s]) for s in range(S)]
     chance = [C.chance_hit ** hits[s] * (1 - C.chance_hit) ** misses[s] for s in range(S)]
+    stood = evidence.stationary_hits[0], evidence.stationary_misses[0]
+    moving = [
+        marginal(hits[s] - stood[0][s], misses[s] - stood[1][s], sensors.p_detect[s])
+        * C.chance_hit ** stood[0][s]
+        * (1 - C.chance_hit) ** stood[1][s]
+        for s in range(S)
+    ]
     odds = [np.exp(sensors.indifference[s] + evidence.peak[0, s]) if found[s] else 1.0 for s in range(S)]
     prior = [np.exp(sensors.prior_odds[s]) if found[s] else 1.0 for s in range(S)]
     real = 0.0
-    for sees in product([True, False], repeat=S):
+    for sees in product(["always", "moving", "never"], repeat=S):
         weight = 1.0
         for s in range(S):
             g = sensors.unseen[s]
-            weight *= ((1 - g) * seen[s] if sees[s] else g * chance[s]) * odds[s]
+            b = sensors.stationary_unseen[s] if stood[0][s] + stood[1][s] > 0 else 0.0
+            ways = {
+                "always": (1 - g) * (1 - b) * seen[s],
+                "moving": (1 - g) * b * moving[s],
+                "never": g * chance[s],
+            }
+            weight *= ways[sees[s]] * odds[s]
         real += weight
     false = 0.0
     for owner in np.flatnonzero(found):
@@ -98,8 +119,10 @@ def enumerated(evidence, sensors):
     ],
 )
 @pytest.mark.parametrize("gained", [0.0, 3.0])
-def test_posterior_is_the_enumeration_of_hypotheses(hits, misses, scores, gained):
-    evidence, sensors = evidence_of(hits, misses, scores, gained=gained), sensors_of(len(hits))
+@pytest.mark.parametrize("stood", [0.0, 0.4, 1.0])
+def test_posterior_is_the_enumeration_of_hypotheses(hits, misses, scores, gained, stood):
+    evidence = evidence_of(hits, misses, scores, gained=gained, stood=stood)
+    sensors = sensors_of(len(hits))
     assert op.posterior(evidence, sensors, C).real[0] == pytest.approx(
         enumerated(evidence, sensors), rel=1e-6
     )
@@ -116,7 +139,7 @@ def test_a_posterior_is_a_probability(hits, miss, score, gained, overlap):
     number = len(hits)
     evidence = evidence_of(hits, [miss] * number, [score] * number, gained=gained, overlap=overlap)
     belief = op.posterior(evidence, sensors_of(number), C)
-    for value in (belief.real, belief.noise, belief.unseen):
+    for value in (belief.real, belief.noise, belief.unseen, belief.stationary_unseen):
         assert ((value >= 0.0) & (value <= 1.0)).all()
     assert np.isfinite(belief.log_odds).all()
 
@@ -172,6 +195,31 @@ def test_learning_finds_a_sensors_probability_of_detection():
     np.testing.assert_allclose(learnt.p_detect, [0.4, 0.9], atol=0.04)
 
 
+def test_learning_finds_that_a_sensor_does_not_see_what_stands():
+    """Vehicles that stop are missed by the first sensor then, and found by the second all the same."""
+    rng = np.random.default_rng(4)
+    parts = []
+    for _ in range(60):
+        hits, other = float(rng.binomial(10, 0.8)), float(rng.binomial(20, 0.6))
+        one = evidence_of([hits, other], [20.0 - hits, 20.0 - other], [2.5, 2.5], gained=20.0)
+        stood = np.array([[0.0, other / 2]]), np.array([[10.0, (20.0 - other) / 2]])
+        parts.append(replace(one, stationary_hits=stood[0], stationary_misses=stood[1]))
+    evidence = parts[0]
+    for part in parts[1:]:
+        evidence = evidence.append(part)
+    believed = sensors_of(2, prior_odds=0.0, stationary_unseen=C.stationary_unseen_share)
+    for _ in range(3):
+        believed = op.learn_sensors(evidence, believed, C)
+    assert believed.stationary_unseen[0] == C.stationary_unseen_bounds[1]
+    assert believed.stationary_unseen[1] < C.stationary_unseen_share
+    np.testing.assert_allclose(believed.p_detect, [0.8, 0.6], atol=0.08)
+    # Its silence on what stands then says little.
+    silent = evidence_of([0.0, 9.0], [20.0, 9.0], [np.nan, 1.2], owner=1, gained=20.0, stood=1.0)
+    naive = believed._replace(stationary_unseen=np.full(2, 0.02))
+    told = [op.posterior(silent, one, C).log_odds[0] for one in (believed, naive)]
+    assert told[0] - told[1] > 1.0
+
+
 def test_learning_from_nothing_changes_nothing():
     sensors = sensors_of(2)
     assert op.learn_sensors(Evidence.none(2), sensors, C) is sensors
@@ -182,7 +230,14 @@ def test_scores_count_once_a_track_however_often_it_is_found():
     evidence = Evidence.of_births(0.0, 0, 1, logits, np.zeros(1), clock.weight)
     for n in range(1, 100):
         evidence = count_hits(
-            evidence, np.array([0]), 0, logits, np.array([2.0]), clock._replace(t=0.05 * n), C
+            evidence,
+            np.array([0]),
+            0,
+            logits,
+            np.array([2.0]),
+            np.array([False]),
+            clock._replace(t=0.05 * n),
+            C,
         )
     eta = op.score_log_odds(evidence, sensors_of(1), C)[0, 0]
     assert eta == pytest.approx(1.0 - 1.0)

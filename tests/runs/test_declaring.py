@@ -122,9 +122,9 @@ def test_a_sensor_declared_by_its_rate_alone_is_as_an_undeclared_one():
 
 
 def test_what_a_declared_sensor_says_itself_counts():
-    said = load_config("default", ["sensors.gantry={rate_hz: 20, even_score: 0.4, kind: event}"])
+    said = load_config("default", ["sensors.gantry={rate_hz: 20, even_score: 0.4}"])
     sensor = fit_input(said, camera(0.0, name="gantry"))[0].sensors["gantry"]
-    assert sensor == SensorConfig(rate_hz=20.0, even_score=0.4, kind="event")
+    assert sensor == SensorConfig(rate_hz=20.0, even_score=0.4)
 
 
 def test_who_refuses_sensors_that_are_not_declared_gets_none_and_keeps_the_rates():

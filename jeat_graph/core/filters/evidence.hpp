@@ -22,7 +22,7 @@ struct ScanClock {
 
 struct Evidence {
     std::size_t sensors = 0;
-    std::vector<double> hits, misses, recent, recent_weight, peak, total, total_weight;
+    std::vector<double> hits, misses, stationary_hits, stationary_misses, recent, recent_weight, peak, total, total_weight;
     std::vector<std::uint8_t> found;
     std::vector<double> overlap, gained, detections;
     std::vector<std::int64_t> owner;
@@ -33,6 +33,8 @@ struct Evidence {
     template <class Visit> void columns(Visit visit) {
         visit("hits", hits, sensors);
         visit("misses", misses, sensors);
+        visit("stationary_hits", stationary_hits, sensors);
+        visit("stationary_misses", stationary_misses, sensors);
         visit("recent", recent, sensors);
         visit("recent_weight", recent_weight, sensors);
         visit("peak", peak, sensors);
@@ -49,7 +51,8 @@ struct Evidence {
 
     void widen() {
         const std::size_t rows = size();
-        for (auto* column : {&hits, &misses, &recent, &recent_weight, &peak, &total, &total_weight})
+        for (auto* column : {&hits, &misses, &stationary_hits, &stationary_misses, &recent, &recent_weight, &peak, &total,
+                             &total_weight})
             widen_rows(*column, rows, sensors, 1);
         widen_rows(found, rows, sensors, 1);
         ++sensors;
@@ -68,11 +71,12 @@ struct Evidence {
         born_s[row] = last_s[row] = t;
     }
 
-    void count_hit(std::size_t row, std::size_t sensor, double logit, double gain, const ScanClock& clock,
+    void count_hit(std::size_t row, std::size_t sensor, double logit, double gain, bool stationary, const ScanClock& clock,
                    const ModelConstants& c) {
         const std::size_t at = row * sensors + sensor;
         const bool first = hits[at] <= 0.0 && owner[row] != static_cast<std::int64_t>(sensor);
         hits[at] += clock.weight;
+        if (stationary) stationary_hits[at] += clock.weight;
         found[at] = 1;
         recent[at] = recent[at] * clock.keep_recent + logit * clock.weight;
         recent_weight[at] = recent_weight[at] * clock.keep_recent + clock.weight;
@@ -86,8 +90,9 @@ struct Evidence {
         last_s[row] = clock.t;
     }
 
-    void count_miss(std::size_t row, std::size_t sensor, double visible, double weight) {
+    void count_miss(std::size_t row, std::size_t sensor, double visible, bool stationary, double weight) {
         misses[row * sensors + sensor] += weight * visible;
+        if (stationary) stationary_misses[row * sensors + sensor] += weight * visible;
     }
 
     // Add some rows of another table with as many sensors.

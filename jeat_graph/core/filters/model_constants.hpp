@@ -78,6 +78,9 @@ struct Bounds {
     JEAT_ONE(chance_hit) \
     JEAT_ONE(unseen_share) \
     JEAT_PAIR(unseen_bounds) \
+    JEAT_ONE(stationary_speed) \
+    JEAT_ONE(stationary_unseen_share) \
+    JEAT_PAIR(stationary_unseen_bounds) \
     JEAT_ONE(shared_false) \
     JEAT_ONE(noise_share) \
     JEAT_PAIR(noise_bounds) \

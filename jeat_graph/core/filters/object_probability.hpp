@@ -15,21 +15,22 @@ inline constexpr int kRounds = 2;
 inline constexpr double kLeastMisses = 0.2, kLeastLooks = 1.0;
 
 struct SensorBelief {
-    std::vector<double> p_detect, unseen, indifference, prior_odds;
+    std::vector<double> p_detect, unseen, stationary_unseen, indifference, prior_odds;
     double noise_share;
 
     void widen(const ModelConstants& c) {
         p_detect.push_back(c.p_detect);
         unseen.push_back(c.unseen_share);
+        stationary_unseen.push_back(c.stationary_unseen_share);
         indifference.push_back(0.0);
         prior_odds.push_back(0.0);
     }
 };
 
-// What one track is; of each sensor the probability that it never sees it.
+// What one track is; of each sensor the probabilities that it never sees it, and not while it stands.
 struct Posterior {
     double log_odds, noise;
-    std::vector<double> unseen;
+    std::vector<double> unseen, stationary_unseen;
 };
 
 class PosteriorRule {
@@ -45,12 +46,17 @@ public:
             log_unseen_.push_back(log_of(g));
             log_not_unseen_.push_back(log1p_of(-g));
         }
+        for (const double b : sensors.stationary_unseen) {
+            log_stationary_.push_back(log_of(b));
+            log_not_stationary_.push_back(log1p_of(-b));
+        }
         log_chance_ = log_of(c.chance_hit);
         log_no_chance_ = log1p_of(-c.chance_hit);
         log_shared_ = log_of(c.shared_false);
         log_not_shared_ = log1p_of(-c.shared_false);
         noise_odds_ = log_of(sensors.noise_share / (1.0 - sensors.noise_share));
         out_.unseen.resize(seen_.size());
+        out_.stationary_unseen.resize(seen_.size());
     }
 
     const Posterior& operator()(const Evidence& e, std::size_t row) {
@@ -61,7 +67,16 @@ public:
             seen_[s] = log_beta(a_[s] + h, b_[s] + m) - log_beta_[s];
             const double chance = h * log_chance_ + m * log_no_chance_;
             const double never = log_unseen_[s] + chance;
-            const double object = log_add(never, log_not_unseen_[s] + seen_[s]);
+            const double hs = e.stationary_hits[first + s], ms = e.stationary_misses[first + s];
+            double sees = seen_[s];
+            out_.stationary_unseen[s] = 0.0;
+            if (hs + ms > 0.0) {
+                const double blind = log_stationary_[s] + log_beta(a_[s] + h - hs, b_[s] + m - ms) - log_beta_[s] +
+                                     hs * log_chance_ + ms * log_no_chance_;
+                sees = log_add(blind, log_not_stationary_[s] + seen_[s]);
+                out_.stationary_unseen[s] = exp_of(blind - sees);
+            }
+            const double object = log_add(never, log_not_unseen_[s] + sees);
             out_.unseen[s] = exp_of(never - object);
             shared_[s] = log_add(log_not_shared_ + chance, log_shared_ + seen_[s]);
             const bool found = e.found[first + s];
@@ -91,18 +106,20 @@ private:
 
     const SensorBelief& sensors_;
     const ModelConstants& c_;
-    std::vector<double> a_, b_, log_beta_, log_unseen_, log_not_unseen_, seen_, shared_, scores_;
+    std::vector<double> a_, b_, log_beta_, log_unseen_, log_not_unseen_, log_stationary_, log_not_stationary_;
+    std::vector<double> seen_, shared_, scores_;
     double log_chance_, log_no_chance_, log_shared_, log_not_shared_, noise_odds_;
     Posterior out_;
 };
 
 // Sums over tracks from which the sensors are learnt.
 struct SensorSums {
-    std::vector<double> hits, looks, unseen, seeable, real, not_real;
+    std::vector<double> hits, looks, unseen, seeable, stationary_unseen, stationary, real, not_real;
     double noise = 0.0, not_object = 0.0;
 
     explicit SensorSums(std::size_t S)
-        : hits(S, 0.0), looks(S, 0.0), unseen(S, 0.0), seeable(S, 0.0), real(S, 0.0), not_real(S, 0.0) {}
+        : hits(S, 0.0), looks(S, 0.0), unseen(S, 0.0), seeable(S, 0.0), stationary_unseen(S, 0.0), stationary(S, 0.0),
+          real(S, 0.0), not_real(S, 0.0) {}
 
     void add(const Evidence& e, PosteriorRule& rule, const ModelConstants& c) {
         for (std::size_t row = 0; row < e.size(); ++row) {
@@ -114,9 +131,15 @@ struct SensorSums {
                 const std::size_t at = row * e.sensors + s;
                 const double h = e.hits[at], n = h + e.misses[at];
                 missed += e.misses[at];
-                const double weight = p * (1.0 - belief.unseen[s]) * std::min(1.0, c.looks_count / std::max(n, kLeastSum));
-                hits[s] += weight * h;
-                looks[s] += weight * n;
+                const double seen = p * (1.0 - belief.unseen[s]), blind = belief.stationary_unseen[s];
+                const double hs = e.stationary_hits[at], ns = hs + e.stationary_misses[at];
+                const double weight = seen * std::min(1.0, c.looks_count / std::max(n, kLeastSum));
+                hits[s] += weight * (h - blind * hs);
+                looks[s] += weight * (n - blind * ns);
+                if (ns > kLeastLooks) {
+                    stationary_unseen[s] += seen * blind;
+                    stationary[s] += seen;
+                }
                 if (n > kLeastLooks) {
                     unseen[s] += p * belief.unseen[s];
                     seeable[s] += p;
@@ -152,6 +175,9 @@ inline void learn_sensors(const Evidence& ended, const Evidence& living, SensorB
                                      c.p_detect_bounds.low, c.p_detect_bounds.high);
             next.unseen[s] = clamp(beta_share(sums.unseen[s], sums.seeable[s], c.unseen_share, c.sensor_count),
                                    c.unseen_bounds.low, c.unseen_bounds.high);
+            next.stationary_unseen[s] = clamp(
+                beta_share(sums.stationary_unseen[s], sums.stationary[s], c.stationary_unseen_share, c.sensor_count),
+                c.stationary_unseen_bounds.low, c.stationary_unseen_bounds.high);
             next.prior_odds[s] = log_of((sums.real[s] + c.sensor_count) / (sums.not_real[s] + c.sensor_count));
         }
         next.noise_share = clamp(beta_share(sums.noise, sums.not_object, c.noise_share, c.sensor_count),

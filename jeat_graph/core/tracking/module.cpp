@@ -59,8 +59,8 @@ public:
     Model(const Model&) = delete;
     Model& operator=(const Model&) = delete;
 
-    void declare_sensor(double even_logit, bool sees_changes) {
-        now_.state.declare_sensor(even_logit, sees_changes);
+    void declare_sensor(double even_logit) {
+        now_.state.declare_sensor(even_logit);
     }
 
     void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
@@ -189,6 +189,7 @@ public:
         Named out;
         out["p_detect"] = array_of(state.belief.p_detect);
         out["unseen"] = array_of(state.belief.unseen);
+        out["stationary_unseen"] = array_of(state.belief.stationary_unseen);
         out["indifference"] = array_of(state.belief.indifference);
         out["prior_odds"] = array_of(state.belief.prior_odds);
         std::vector<double> leftovers;
@@ -285,9 +286,9 @@ void bind(nb::module_& module) {
              "constants: a ModelConstants; width, height: of the picture (px), if known; lag_s: of the smoother (s),\n"
              "infinite for whole tracks, negative for none.")
         .def("declare_sensor", &Model::declare_sensor,
-             nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(), nb::arg("sees_changes") = false,
+             nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(),
              "Add a sensor that has not looked yet. even_logit: of the score at which a box is as likely real as not,\n"
-             "NaN where it is to be learnt; sees_changes: whether it sees nothing of what stands still.")
+             "NaN where it is to be learnt.")
         .def("take", &Model::take, nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
              nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("alike").noconvert() = nb::none(),
              "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"

@@ -140,7 +140,7 @@ void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_
 }
 
 template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix, Sensor& sensor) {
-    auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_look_s, repetition, even_logit, sees_changes] = sensor;
+    auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_look_s, repetition, even_logit] = sensor;
     v.numbers(prefix + "leftovers", &leftovers, 1);
     v.numbers(prefix + "false_boxes", &false_boxes, 1);
     v.numbers(prefix + "boxes_at_edge", &boxes_at_edge, 1);
@@ -148,7 +148,6 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
     v.numbers(prefix + "period_s", &period_s, 1, Values::any);
     v.numbers(prefix + "last_look_s", &last_look_s, 1, Values::any);
     v.numbers(prefix + "even_logit", &even_logit, 1, Values::any);
-    v.whole(prefix + "sees_changes", sees_changes);
     auto& [boxes, repeated, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
     std::size_t rows = last_boxes.size();
     v.whole(prefix + "rows", rows);
@@ -193,9 +192,10 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     auto& [gaps_ended, ended_well] = gaps;
     v.numbers("gaps.ended", gaps_ended.data(), gaps_ended.size());
     v.numbers("gaps.ended_well", ended_well.data(), ended_well.size());
-    auto& [p_detect, unseen, indifference, prior_odds, noise_share] = belief;
+    auto& [p_detect, unseen, stationary_unseen, indifference, prior_odds, noise_share] = belief;
     v.column("belief.p_detect", p_detect, S, 1);
     v.column("belief.unseen", unseen, S, 1);
+    v.column("belief.stationary_unseen", stationary_unseen, S, 1);
     v.column("belief.indifference", indifference, S, 1);
     v.column("belief.prior_odds", prior_odds, S, 1);
     v.numbers("belief.noise_share", &noise_share, 1);
@@ -364,6 +364,10 @@ inline void check_state(const State& state, const Answer& answer) {
     for (const Evidence* one : {&state.tracks.evidence, &state.ended})
         for (const std::int64_t owner : one->owner)
             StateReader::require(owner >= 0 && static_cast<std::size_t>(owner) < S, "owner", "is no sensor");
+    for (const Evidence* one : {&state.tracks.evidence, &state.ended})
+        for (std::size_t k = 0; k < one->hits.size(); ++k)
+            StateReader::require(one->stationary_hits[k] <= one->hits[k] && one->stationary_misses[k] <= one->misses[k],
+                                 "stationary hits and misses", "are more than all");
     const auto shares = [](const char* name, const std::vector<double>& values) {
         for (const double p : values) StateReader::require(p >= 0.0 && p <= 1.0, name, "holds what is no probability");
     };
@@ -371,6 +375,7 @@ inline void check_state(const State& state, const Answer& answer) {
     shares("tracks.presence", state.tracks.presence);
     shares("belief.p_detect", state.belief.p_detect);
     shares("belief.unseen", state.belief.unseen);
+    shares("belief.stationary_unseen", state.belief.stationary_unseen);
 }
 
 inline void check_histories(Histories& histories, const State& state, bool smooths) {

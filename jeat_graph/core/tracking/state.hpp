@@ -80,9 +80,8 @@ struct Sensor {
     double last_look_s = std::numeric_limits<double>::quiet_NaN();
     RepeatCounts repetition;                                      // look
     // What the user says of it: the logit of the score at which a box is as likely real as not, NaN where it is to
-    // be learnt; and whether it sees changes alone, as an event camera does.
+    // be learnt.
     double even_logit = std::numeric_limits<double>::quiet_NaN();
-    bool sees_changes = false;
 };
 
 struct State {
@@ -126,7 +125,7 @@ struct State {
         return picture_known && at >= beyond;
     }
 
-    void declare_sensor(double even_logit, bool sees_changes) {
+    void declare_sensor(double even_logit) {
         belief.widen(constants);
         tracks.widen();
         ended.widen();
@@ -135,7 +134,6 @@ struct State {
         Sensor sensor;
         sensor.leftovers = sensor.false_boxes = constants.first_leftovers;
         sensor.even_logit = even_logit;
-        sensor.sees_changes = sees_changes;
         sensors.push_back(std::move(sensor));
     }
 };

@@ -20,8 +20,6 @@ namespace jeat::tracking {
 
 inline constexpr double kPeriodMemory = 0.9, kGapPeriods = 1.5, kLongestPeriodS = 0.1;
 inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6, kDue = 0.9;
-// What an event camera misses though it is there: what moves less than this in the picture (px/s).
-inline constexpr double kLeastSpeed = 10.0;
 // Longer ago than this is no longer told apart (s).
 inline constexpr double kLongestAgoS = 1e9;
 
@@ -340,16 +338,16 @@ private:
             double &hits = tracks.recent_hits[i * S + k], &misses = tracks.recent_misses[i * S + k];
             hits *= keep;
             misses *= keep;
+            const bool stationary = is_stationary(i);
             if (pair_of_[i] == pairs_.size()) {
-                if (blind_to(scan.sensor, i)) continue;
                 const double visible = presence[kVisible];
-                miss_presence(presence, p_detect_[i]);
-                tracks.evidence.count_miss(i, k, visible, clock.weight);
+                miss_presence(presence, stationary ? p_detect_[i] * (1.0 - s_.belief.stationary_unseen[k]) : p_detect_[i]);
+                tracks.evidence.count_miss(i, k, visible, stationary, clock.weight);
                 misses += clock.weight * visible;
             } else {
                 const association::Pair& pair = pairs_[pair_of_[i]];
                 see_presence(presence);
-                tracks.evidence.count_hit(i, k, scan.logits[pair.column], pair.gain, clock, c_);
+                tracks.evidence.count_hit(i, k, scan.logits[pair.column], pair.gain, stationary, clock, c_);
                 hits += clock.weight;
                 tracks.used[i] |= std::int64_t{1} << k;
             }
@@ -508,11 +506,11 @@ private:
         smoothers::halve(s_.tracks.covariance_of(row), entry.predicted_covariance);
     }
 
-    // Whether a sensor that sees changes alone says nothing of a track: it stands still.
-    bool blind_to(std::size_t sensor, std::size_t row) {
-        if (!s_.sensors[sensor].sees_changes) return false;
+    // Whether a track stands, as far as is known.
+    bool is_stationary(std::size_t row) {
         const double* const m = s_.tracks.mean_of(row);
-        return square(m[kVelocity]) + square(m[kStates + kVelocity]) < square(kLeastSpeed);
+        const double area = exp_of(m[kLogSize] + m[kStates + kLogSize]);
+        return square(m[kVelocity]) + square(m[kStates + kVelocity]) < square(c_.stationary_speed) * area;
     }
 
     double unseen_for(std::size_t row) const { return s_.t - s_.tracks.evidence.last_s[row]; }

@@ -267,11 +267,7 @@ class PaperTracker(Updates):
         """Return the mean factor on each sensor's noise, by name; the paper learns nothing else of them."""
         scale = self._tracks.scale[self._tracks.confirmed]
         mean = scale.mean(axis=0) if len(scale) else np.ones(len(self.sensor_names))
-        unknown = float("nan")
-        return {
-            name: SensorState(unknown, unknown, 1.0, 0.0, float(mean[s]))
-            for s, name in enumerate(self.sensor_names)
-        }
+        return {name: SensorState(float(mean[s])) for s, name in enumerate(self.sensor_names)}
 
     def save(self, path: str | Path) -> NoReturn:
         """Refuse: a run with this engine is short enough to begin again."""
