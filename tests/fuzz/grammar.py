@@ -59,7 +59,6 @@ def settings(seed: int, sensors: tuple[str, ...], preset: str) -> list[str]:
     if preset == "paper":
         return drawn + of_the_paper(rng)
     for name in sensors:
-        drawn.append(f"sensors.{name}.kind={rng.choice(['any', 'event'])}")
         drawn.append(f"sensors.{name}.even_score={rng.choice(['null', '1e-9', '0.5', '1.0'])}")
     return drawn
 
