@@ -77,7 +77,8 @@ class Evidence(ArrayTable):
         per_sensor, one = np.zeros((0, sensors)), np.zeros(0)
         whole, truth = np.zeros(0, dtype=np.int64), np.zeros((0, sensors), dtype=np.bool_)
         logits = per_sensor, per_sensor, per_sensor, per_sensor, per_sensor
-        return cls(*(per_sensor,) * 4, truth, *logits, one, one, one, whole, one, one)
+        counts = per_sensor, per_sensor, per_sensor, per_sensor
+        return cls(*counts, truth, *logits, one, one, one, whole, one, one)
 
     @classmethod
     def of_births(
@@ -94,17 +95,31 @@ class Evidence(ArrayTable):
             weight: of one detection, in correlation times.
         """
         number = len(logits)
-        counts = [np.zeros((number, sensors)) for _ in range(4)]
-        recent, recent_weight, peak, total, total_weight = (np.zeros((number, sensors)) for _ in range(5))
+        none = np.zeros((number, sensors))
+        recent, recent_weight, peak, total, total_weight = (none.copy() for _ in range(5))
         found = np.zeros((number, sensors), dtype=np.bool_)
         found[:, sensor] = True
         recent[:, sensor] = total[:, sensor] = logits * weight
         recent_weight[:, sensor] = total_weight[:, sensor] = weight
         peak[:, sensor] = logits
-        scores = (recent, recent_weight, peak, total, total_weight)
         owner, time = np.full(number, sensor, dtype=np.int64), np.full(number, t)
         return cls(
-            *counts, found, *scores, overlap, np.zeros(number), np.ones(number), owner, time, time.copy()
+            hits=none,
+            misses=none,
+            stationary_hits=none,
+            stationary_misses=none,
+            found=found,
+            recent=recent,
+            recent_weight=recent_weight,
+            peak=peak,
+            total=total,
+            total_weight=total_weight,
+            overlap=overlap,
+            gained=np.zeros(number),
+            detections=np.ones(number),
+            owner=owner,
+            born_s=time,
+            last_s=time.copy(),
         )
 
 
