@@ -77,7 +77,7 @@ def publish(
         tables: by the name they have in the README's markers.
     """
     from jeat_graph.eval.tables import to_json
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     sys.stdout.write("\n".join(table.render("text") for table in tables.values()))
     markdown = {key: table.render("markdown") for key, table in tables.items()}

@@ -93,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run, print a line a period and the table; 1 if there was a warning."""
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     def tell(periods: list[Period]) -> None:
         one = periods[-1]

@@ -14,7 +14,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
-from jeat_graph.io.scan_batch import ScanBatch
+from jeat_graph.io.streams.scan_batch import ScanBatch
 from jeat_graph.live.messages import ScanMessage
 
 RATES_HZ = {"evt": 100.0, "rgb": 20.0}

@@ -189,8 +189,8 @@ def read_sets(layout: str, root: Path, how: LayoutOptions) -> list[RecordingSet]
 
 def _read(one: FoundRecording, how: LayoutOptions) -> JudgedRecording:
     from jeat_graph.eval.load import restrict_classes
-    from jeat_graph.io.detections_io import read_detections
-    from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.io.tables.detections_io import read_detections
+    from jeat_graph.io.tables.truth_io import read_truth
 
     rate = one.rate_hz or how.rate_hz
     if rate is None and "motchallenge" in one.forms:

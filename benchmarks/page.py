@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.judging import CAUSAL, SMOOTHED
-from jeat_graph.io.atomic import open_atomic
+from jeat_graph.io.files.atomic import open_atomic
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table

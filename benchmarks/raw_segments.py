@@ -14,7 +14,7 @@ from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_S
 from jeat_graph.detection.named import MOTION, network_file
 from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import DetectionSettings
-from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.files.hashing import sha256_of
 
 _SEGMENTS, _TRUTH, _EVENTS, _MANIFEST = "segments", "gt.csv", "events.h5", "manifest.json"
 SENSORS = (FRAMES_SENSOR, EVENTS_SENSOR)
@@ -36,13 +36,13 @@ class RawSegment:
 
     def truth(self) -> GroundTruth:
         """Read the true boxes."""
-        from jeat_graph.io.truth_io import read_truth
+        from jeat_graph.io.tables.truth_io import read_truth
 
         return read_truth(self.folder / _TRUTH)
 
     def size_px(self) -> tuple[int, int]:
         """Return the width and height of the pictures."""
-        from jeat_graph.io.video import open_frames
+        from jeat_graph.io.media.video import open_frames
 
         with open_frames(self.folder) as frames:
             return frames.size_px

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import open_atomic
+from jeat_graph.io.files.atomic import open_atomic
 
 _BLOCK = re.compile(r"(<!-- table: (?P<name>[\w-]+) -->\n)(?P<old>.*?)(<!-- end -->)", re.DOTALL)
 

@@ -27,7 +27,7 @@ def road_costs(duration_s: float) -> list[dict[str, Any]]:
 
 def causal_cost(duration_s: float) -> dict[str, Any]:
     """Share that causal columns of the road take of a step without them; CPU time, medians over steps."""
-    from jeat_graph.io.detections_io import read_detections
+    from jeat_graph.io.tables.detections_io import read_detections
     from jeat_graph.road.camera_file import read_camera
     from jeat_graph.road.causal import RoadFilter
     from jeat_graph.tracking.tracker import Tracker

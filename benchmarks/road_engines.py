@@ -20,7 +20,7 @@ def judge_engines(run: Path, truth: Path, camera: RoadCamera) -> dict[str, dict[
         camera: the camera.
     """
     from jeat_graph.eval.road import judge_road_run
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
     from jeat_graph.road.box_rows import BoxConfig
     from jeat_graph.road.boxes_road import boxes_of_table, follow_boxes
     from jeat_graph.road.cuboid_fit import CuboidConfig

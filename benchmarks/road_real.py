@@ -10,7 +10,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.eval.road import share_held
-from jeat_graph.io.tables import read_table
+from jeat_graph.io.tables.file_tables import read_table
 
 #: Which of the measured lengths are used.
 LENGTH_SETS = ("all", "two along", "one along, one across")

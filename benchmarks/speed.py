@@ -159,7 +159,7 @@ def _write(result: dict[str, Any], args: argparse.Namespace) -> None:
     from benchmarks.provenance import provenance
     from jeat_graph.config.reading import load_config
     from jeat_graph.drawing.speed import plot_speed
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     settings = {key: getattr(args, key) for key in ("objects", "frames", "warm_up", "repeats", "clock")}
     head = provenance(settings, {name: load_config(name) for name in ("default", "paper")})

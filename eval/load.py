@@ -21,11 +21,11 @@ from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
 from jeat_graph.eval.resampling import TIME_TOLERANCE_S, on_the_clock_of
-from jeat_graph.io.beside import check_beside
-from jeat_graph.io.formats import FIRST_OPEN
-from jeat_graph.io.scans_io import read_instants
-from jeat_graph.io.trajectories_io import read_trajectories_counted
-from jeat_graph.io.truth_io import read_truth_counted
+from jeat_graph.io.files.beside import check_beside
+from jeat_graph.io.tables.formats import FIRST_OPEN
+from jeat_graph.io.tables.scans_io import read_instants
+from jeat_graph.io.tables.trajectories_io import read_trajectories_counted
+from jeat_graph.io.tables.truth_io import read_truth_counted
 
 SUFFIXES = (".csv", ".parquet")
 _SAME_RATE = 0.02  # relative: 29.97 Hz and 30 are one rate, 25 and 30 are two
@@ -88,7 +88,7 @@ def load_run(
     Raises:
         DataError: a file is missing or not valid, or run and truth do not fit together.
     """
-    from jeat_graph.io.formats import counts_frames, recognise
+    from jeat_graph.io.tables.formats import counts_frames, recognise
 
     path, truth_path, how = Path(run), Path(truth), Reading(**options)
     tables = tables_of(path)
@@ -179,7 +179,7 @@ def tables_of(path: Path) -> dict[str, Path]:
     Raises:
         DataError: there is no such path, or it is a directory without either table, or with a link elsewhere.
     """
-    from jeat_graph.io.yolo_labels import is_label_folder
+    from jeat_graph.io.tables.yolo_labels import is_label_folder
 
     if not path.exists():
         raise DataError("there is no such run directory or table", path)
@@ -222,7 +222,7 @@ def read_tables(path: Path, **options: Unpack[ReadingOptions]) -> dict[str, Traj
     Raises:
         DataError: as `tables_of`; or a table is not valid.
     """
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
 
     return {kind: read_trajectories(file, **options) for kind, file in tables_of(path).items()}
 
@@ -240,7 +240,7 @@ def recording_span(source: Path, file: Path, table: Trajectories) -> tuple[float
     Raises:
         DataError: `scans.csv` is not valid.
     """
-    from jeat_graph.io.formats import BY_FRAME, recognise
+    from jeat_graph.io.tables.formats import BY_FRAME, recognise
 
     scans = read_instants(source)
     times = table.t if scans is None or not len(scans) else np.concatenate((table.t, scans))
@@ -252,7 +252,7 @@ def recording_span(source: Path, file: Path, table: Trajectories) -> tuple[float
 
 def _rate_beside(truth: Path, form: str, any_will_do: bool) -> float:
     """Rate of a truth that counts frames, from `seqinfo.ini`; any, where the run counts frames too."""
-    from jeat_graph.io.motchallenge import sequence_info
+    from jeat_graph.io.tables.motchallenge import sequence_info
 
     info = sequence_info(truth)
     if form == "motchallenge" and info.rate_hz is not None:

@@ -11,7 +11,7 @@ import numpy as np
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.tables import read_table
+from jeat_graph.io.tables.file_tables import read_table
 
 _TRUE = ("x", "y", "speed_kmh")
 _ESTIMATED = (*_TRUE, "var_x", "var_y", "var_speed_kmh")

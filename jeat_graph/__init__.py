@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections, Scan
     from jeat_graph.data.errors import JeatGraphError
     from jeat_graph.data.trajectories import GroundTruth, Trajectories
-    from jeat_graph.io.config_io import save_config
-    from jeat_graph.io.detections_io import read_detections
-    from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.io.files.config_io import save_config
+    from jeat_graph.io.tables.detections_io import read_detections
+    from jeat_graph.io.tables.truth_io import read_truth
     from jeat_graph.tracking.tracker import Tracker
 
 _HOMES = {
@@ -37,10 +37,10 @@ _HOMES = {
     "evaluate": "api.functions",
     "factor_graph": "api.graphs",
     "load_config": "config.reading",
-    "read_detections": "io.detections_io",
+    "read_detections": "io.tables.detections_io",
     "read_run": "api.functions",
-    "read_truth": "io.truth_io",
-    "save_config": "io.config_io",
+    "read_truth": "io.tables.truth_io",
+    "save_config": "io.files.config_io",
     "simulate": "api.functions",
     "track": "api.functions",
 }

@@ -270,7 +270,7 @@ def read_run(path: PathLike, **options: Unpack[ReadingOptions]) -> Run:
         DataError: there is no run, or a file of it is not valid.
     """
     from jeat_graph.eval.load import read_tables
-    from jeat_graph.io.scans_io import read_instants
+    from jeat_graph.io.tables.scans_io import read_instants
     from jeat_graph.runs.directory import read_record
 
     folder = Path(path)

@@ -10,9 +10,9 @@ from jeat_graph.data.class_columns import LISTS_COUNT_FROM
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.io.class_names import names_by_number
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.truth_io import read_truth
+from jeat_graph.io.tables.class_names import names_by_number
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.truth_io import read_truth
 
 if TYPE_CHECKING:
     import pandas as pd

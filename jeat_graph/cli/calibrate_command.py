@@ -57,10 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Calibrate, write the configuration, and print what was estimated."""
     from jeat_graph.config.reading import as_config, load_config
-    from jeat_graph.io.atomic import check_writable
-    from jeat_graph.io.config_io import save_config
-    from jeat_graph.io.detections_io import read_many, split_name
-    from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.io.files.atomic import check_writable
+    from jeat_graph.io.files.config_io import save_config
+    from jeat_graph.io.tables.detections_io import read_many, split_name
+    from jeat_graph.io.tables.truth_io import read_truth
     from jeat_graph.rig.common_picture import in_common, with_ways_of, without_ways
     from jeat_graph.runs.beside import facts_beside, facts_of_frames
     from jeat_graph.runs.clock_pass import with_clocks
@@ -219,7 +219,7 @@ def _say_lags(found: Calibration, beside: str) -> None:
 
 def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
     """Comment at the head of the file: where each part comes from."""
-    from jeat_graph.io.detections_io import split_name
+    from jeat_graph.io.tables.detections_io import split_name
     from jeat_graph.version import __version__
 
     files = [Path(split_name(item)[1]) for item in args.detections]

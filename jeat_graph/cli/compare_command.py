@@ -58,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.drawing.comparison import write_plots
     from jeat_graph.eval.road_compare import road_truth_beside, with_road
     from jeat_graph.eval.tables import to_json
-    from jeat_graph.io.atomic import check_writable, open_atomic
-    from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.io.files.atomic import check_writable, open_atomic
+    from jeat_graph.io.tables.truth_io import read_truth
     from jeat_graph.runs.beside import rate_of_truth
     from jeat_graph.runs.measured import compare_run, measured_run
 

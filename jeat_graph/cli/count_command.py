@@ -67,8 +67,8 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.eval import counting
     from jeat_graph.eval.load import recording_span, tables_of
     from jeat_graph.eval.zones import zone_crossings
-    from jeat_graph.io.table_writer import write_columns
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.table_writer import write_columns
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
 
     lines, zones = places(args)
     if not lines and not zones:
@@ -124,7 +124,7 @@ def _write_od(
     found: list[LineCrossing], edges: FloatArray, names: list[str], args: argparse.Namespace
 ) -> None:
     from jeat_graph.eval.zones import OdCount, journeys, od_table
-    from jeat_graph.io.table_writer import write_columns
+    from jeat_graph.io.tables.table_writer import write_columns
 
     if len(names) < 2:
         raise DataError("--od needs two lines or zones at least")
@@ -143,7 +143,7 @@ def _write_stations(
 ) -> None:
     from jeat_graph.cli.count_output import on_road
     from jeat_graph.eval.stations import covered_s, stations
-    from jeat_graph.io.table_writer import write_columns
+    from jeat_graph.io.tables.table_writer import write_columns
 
     if not lines:
         raise DataError("--stations is of lines: give --line, or --lines FILE.yaml with some")

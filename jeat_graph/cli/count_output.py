@@ -73,7 +73,7 @@ def on_road(folder: Path, found: Sequence[LineCrossing]) -> tuple[list[str], lis
     Raises:
         DataError: its `crossings.csv` cannot be read.
     """
-    from jeat_graph.io.tables import read_table
+    from jeat_graph.io.tables.file_tables import read_table
 
     table = read_table(folder / _CROSSINGS, ("track_id", "line", "lane", "speed_kmh"))
     keys = zip(table.whole("track_id").tolist(), table.text("line").tolist(), strict=True)

@@ -92,9 +92,9 @@ def _recording(args: argparse.Namespace) -> DemoRecording:
 def _show(args: argparse.Namespace, out: Path) -> None:
     """Track a recording and judge the tracks, and draw them."""
     from jeat_graph.config.reading import as_config, load_config
-    from jeat_graph.io.detections_io import write_detections
-    from jeat_graph.io.trajectories_io import read_trajectories
-    from jeat_graph.io.truth_io import write_truth
+    from jeat_graph.io.tables.detections_io import write_detections
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.truth_io import write_truth
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.directory import RunDirectory
     from jeat_graph.runs.input_checks import check_detections
@@ -146,7 +146,7 @@ def _compare(recording: DemoRecording, config: Config, causal: Trajectories, smo
     """Scores of all sensors together (tracked already) and of each alone, at the truth's times."""
     from jeat_graph.eval.metrics import evaluate
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
     from jeat_graph.tracking.whole import track
 
     detections, truth = recording.detections, recording.truth
@@ -211,7 +211,7 @@ def _errors(recording: DemoRecording, table: Trajectories, t: float) -> tuple[Fl
 
 
 def _write_text(text: str, path: Path) -> None:
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     with open_atomic(path) as file:
         file.write(text)

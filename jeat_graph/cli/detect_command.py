@@ -59,9 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Detect, and write the file."""
     from jeat_graph.detection.live_detecting import is_live_request
-    from jeat_graph.io.atomic import check_writable
-    from jeat_graph.io.detections_io import write_detections
-    from jeat_graph.io.outputs import check_keeps
+    from jeat_graph.io.files.atomic import check_writable
+    from jeat_graph.io.files.outputs import check_keeps
+    from jeat_graph.io.tables.detections_io import write_detections
 
     request = detect_request(args)
     if args.out == STDOUT:

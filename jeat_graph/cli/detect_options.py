@@ -235,7 +235,7 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
     from jeat_graph.detection.masks import read_masks
     from jeat_graph.detection.request import DetectRequest
     from jeat_graph.detection.settings import load_settings
-    from jeat_graph.io.capture.addresses import is_live
+    from jeat_graph.io.files.addresses import is_live
 
     if args.duration is not None and not any(map(is_live, _given(args))):
         raise ConfigError("--duration is of cameras that are on; a recording is read to its end")

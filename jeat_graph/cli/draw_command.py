@@ -16,7 +16,7 @@ from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
-    from jeat_graph.io.video import RgbImage
+    from jeat_graph.io.media.video import RgbImage
 
 WRITES = ("out", "lengths")
 HELP = "draw lines, zones, masks and measured lengths with the mouse, on a page in the browser"
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _picture(args: argparse.Namespace) -> RgbImage:
     """Return what is drawn on: a picture, with the tracks of a run."""
-    from jeat_graph.io.one_frame import frame_at
+    from jeat_graph.io.media.one_frame import frame_at
 
     table = _tracks(Path(args.source))
     frames = args.source if table is None else args.frames
@@ -86,7 +86,7 @@ def _picture(args: argparse.Namespace) -> RgbImage:
 def _tracks(source: Path) -> Trajectories | None:
     """Return the tracks of a run or a table; None where the source is a video."""
     from jeat_graph.eval.load import tables_of
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
 
     has_tables = source.is_dir() and any(any(source.glob(f"{kind}.*")) for kind in ("causal", "smoothed"))
     if not has_tables and source.suffix.lower() not in (".csv", ".parquet"):

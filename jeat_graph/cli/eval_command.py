@@ -136,7 +136,7 @@ def _detections(
 ) -> tuple[Table, dict[str, dict[str, float | int]]]:
     from jeat_graph.eval.detection_ap import detection_ap
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.io.detections_io import read_many
+    from jeat_graph.io.tables.detections_io import read_many
 
     if len(args.detections) != len(truths):
         raise DataError(f"{len(truths)} RUN and {len(args.detections)} --detections given; give one for each")
@@ -152,7 +152,7 @@ def _write(target: str, text: str) -> None:
     if target == "-":
         sys.stdout.write(text)
         return
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     with open_atomic(Path(target)) as file:
         file.write(text)

@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read, and print or write."""
     from jeat_graph.io.events.opening import open_events
-    from jeat_graph.io.outputs import check_keeps
+    from jeat_graph.io.files.outputs import check_keeps
 
     with open_events(args.file, args.event_size, event_layout(args)) as reader:
         if args.todo == "info":

@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     if args.to in ROAD_TARGETS:
         return _export_road(args)
     from jeat_graph.eval.load import tables_of
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
 
     files = tables_of(Path(args.source))
     if args.only and args.only not in files:
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
 
         log_run(tables, Path(args.source).resolve().name, args.out)
     elif args.to == "tum":
-        from jeat_graph.io.tum import write_tum
+        from jeat_graph.io.exports.tum import write_tum
 
         if args.track is None:
             raise DataError("--to tum writes one trajectory: say which with --track ID")
@@ -105,7 +105,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write_ottrk(args: argparse.Namespace, frames: Trajectories, rate_hz: float) -> None:
-    from jeat_graph.io.ottrk import OttrkVideo, write_ottrk
+    from jeat_graph.io.exports.ottrk import OttrkVideo, write_ottrk
     from jeat_graph.runs.recorded import load_run_data
 
     width, height = load_run_data(args.source, None, **tables_read(args)).size_px()
@@ -150,9 +150,9 @@ def _at_frames(args: argparse.Namespace, table: Trajectories, kind: Kind) -> Non
     """Write for programs that count frames."""
     import numpy as np
 
-    from jeat_graph.io.coco_tracks import write_coco_tracks
-    from jeat_graph.io.cvat import write_cvat
-    from jeat_graph.io.scans_io import read_instants
+    from jeat_graph.io.exports.coco_tracks import write_coco_tracks
+    from jeat_graph.io.exports.cvat import write_cvat
+    from jeat_graph.io.tables.scans_io import read_instants
     from jeat_graph.runs.beside import recorded_rate
     from jeat_graph.runs.frame_export import at_frames
     from jeat_graph.runs.recorded import load_run_data

@@ -28,8 +28,8 @@ def run(args: argparse.Namespace) -> int:
     """Write the picture."""
     from jeat_graph.drawing.grid import with_grid
     from jeat_graph.drawing.movie.film import write_png
-    from jeat_graph.io.one_frame import frame_at
-    from jeat_graph.io.outputs import check_keeps
+    from jeat_graph.io.files.outputs import check_keeps
+    from jeat_graph.io.media.one_frame import frame_at
 
     out = Path(args.out)
     if out.suffix.lower() != ".png":

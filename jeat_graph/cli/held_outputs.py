@@ -22,7 +22,7 @@ def holding(args: argparse.Namespace, module: ModuleType) -> Iterator[None]:
         DataError: another process writes one of them, or two arguments name one file.
     """
     from jeat_graph.data.errors import DataError
-    from jeat_graph.io.locking import hold_file, hold_made_folder
+    from jeat_graph.io.files.locking import hold_file, hold_made_folder
 
     named: dict[str, str] = {}
     with ExitStack() as stack:

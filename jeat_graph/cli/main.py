@@ -17,7 +17,7 @@ from jeat_graph.cli.held_outputs import holding
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.data.notes import listening
-from jeat_graph.io.outputs import check_named
+from jeat_graph.io.files.outputs import check_named
 from jeat_graph.version import __version__
 
 # Each module has HELP (one line), add_arguments(parser) and run(args); maybe WRITES and WRITES_INTO, the

@@ -26,7 +26,7 @@ from jeat_graph.data.secrets import without_logins
 from jeat_graph.data.tables.frame_filling import SCORE_SCALES
 from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.time_units import TIME_UNITS
-from jeat_graph.io.formats import FORMATS
+from jeat_graph.io.tables.formats import FORMATS
 
 OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
 

@@ -41,7 +41,7 @@ def places(args: argparse.Namespace) -> tuple[list[Line], list[Zone]]:
     Raises:
         DataError: one is none, or two have one name.
     """
-    from jeat_graph.io.marks import LINES, ZONES, read_marks_file
+    from jeat_graph.io.tables.marks import LINES, ZONES, read_marks_file
 
     lines = [_line(text, k) for k, text in enumerate(args.line, 1)]
     zones = [_zone(text, k) for k, text in enumerate(args.zone, 1)]
@@ -67,7 +67,7 @@ def _line(text: str, number: int) -> Line:
 
 def _zone(text: str, number: int) -> Zone:
     """Read `NAME=x1,y1,x2,y2,x3,y3,…`; without a name it is `zone-1` and so on."""
-    from jeat_graph.io.marks import polygon_of
+    from jeat_graph.io.tables.marks import polygon_of
 
     name, equals, corners = text.rpartition("=")
     try:

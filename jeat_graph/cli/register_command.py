@@ -75,8 +75,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Register every other sensor with the reference, and write the rig if all of it is known."""
     from jeat_graph.config.rig_file import rig_text
-    from jeat_graph.io.atomic import check_writable, open_atomic
-    from jeat_graph.io.detections_io import read_many
+    from jeat_graph.io.files.atomic import check_writable, open_atomic
+    from jeat_graph.io.tables.detections_io import read_many
 
     if Path(args.out).suffix not in (".yaml", ".yml"):
         raise DataError("the name of a rig must end in .yaml", args.out)
@@ -121,7 +121,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _reference(args: argparse.Namespace, recording: Detections) -> str:
-    from jeat_graph.io.detections_io import read_many
+    from jeat_graph.io.tables.detections_io import read_many
 
     if args.reference is not None:
         if args.reference not in recording.sensors:

@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
     """Open what is to be drawn, and draw it."""
     from jeat_graph.drawing.movie.film import write_png
     from jeat_graph.drawing.movie.sources import Request, open_movie
-    from jeat_graph.io.outputs import check_keeps
+    from jeat_graph.io.files.outputs import check_keeps
 
     out = Path(args.out)
     one = args.at is not None or args.strip is not None
@@ -165,7 +165,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _counted(request: Request) -> bool:
     """Whether anything that is read may count frames: pictures, or a result or truth without times."""
-    from jeat_graph.io.formats import counts_frames
+    from jeat_graph.io.tables.formats import counts_frames
 
     files = [path for path in (request.run, request.truth) if path is not None and path.is_file()]
     return request.frames is not None or any(map(counts_frames, files))

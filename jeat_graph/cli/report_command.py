@@ -43,7 +43,7 @@ def run(args: argparse.Namespace) -> int:
     """Read the run, compare if its inputs are there, write the page."""
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.document import render_page
-    from jeat_graph.io.atomic import check_writable, open_atomic
+    from jeat_graph.io.files.atomic import check_writable, open_atomic
     from jeat_graph.runs.beside import rate_of_truth
     from jeat_graph.runs.recorded import load_run_data
 
@@ -75,7 +75,7 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.figures import compared_run
     from jeat_graph.eval.road_compare import road_truth_beside, with_road
-    from jeat_graph.io.truth_io import read_truth
+    from jeat_graph.io.tables.truth_io import read_truth
     from jeat_graph.runs.measured import compare_run, measured_run
 
     folder = Path(args.run_directory)

@@ -62,8 +62,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit the vehicles and write the tables."""
     from jeat_graph.data.tables.reading import ReadingOptions
-    from jeat_graph.io.outputs import check_folder
-    from jeat_graph.io.table_writer import write_columns
+    from jeat_graph.io.files.outputs import check_folder
+    from jeat_graph.io.tables.table_writer import write_columns
     from jeat_graph.road.box_rows import BoxConfig
     from jeat_graph.road.boxes_road import BOX_MOTION, follow_boxes
     from jeat_graph.road.camera_file import read_camera

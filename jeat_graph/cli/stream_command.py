@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from jeat_graph.data.errors import DataError
     from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.detection.live_detecting import LiveDetecting
-    from jeat_graph.io.stream_reading import StreamReading
+    from jeat_graph.io.streams.stream_reading import StreamReading
     from jeat_graph.live.interrupts import Interrupts
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.live.messages import ScanMessage
@@ -259,7 +259,7 @@ def _take_all(
     session: Session, args: argparse.Namespace, interrupts: Interrupts, source: Source | None
 ) -> None:
     from jeat_graph.data.tables.reading import Reading
-    from jeat_graph.io.stream_reading import StreamReading
+    from jeat_graph.io.streams.stream_reading import StreamReading
     from jeat_graph.live.inputs import from_lines
 
     bad = _skip(session) if args.on_error == "skip" else None
@@ -340,7 +340,7 @@ def _skip(session: Session) -> Callable[[DataError], None]:
 def _finish(session: Session, args: argparse.Namespace, cameras: LiveDetecting | None) -> None:
     from dataclasses import asdict
 
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     try:
         session.save()

@@ -28,7 +28,7 @@ class StreamOutput:
 
     def tracks(self, t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:
         """Give out the tracks after an arrival; CSV has no rows twice, so none after a late one."""
-        from jeat_graph.io.track_lines import csv_rows, json_line
+        from jeat_graph.io.streams.track_lines import csv_rows, json_line
         from jeat_graph.live.messages import encode_tracks
 
         if self._sink is not None:
@@ -42,7 +42,7 @@ class StreamOutput:
 
     def begin(self, classes: bool = False) -> None:
         """Give out the header of CSV, once; the first answer shows whether there are classes."""
-        from jeat_graph.io.track_lines import csv_header
+        from jeat_graph.io.streams.track_lines import csv_header
 
         if self._csv and self._classes is None:
             self._classes = classes

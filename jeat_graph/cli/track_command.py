@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
         raise DataError("--duration is of cameras that are on; DETECTIONS are read to their end")
     if args.detections and args.events is not None:
         raise DataError("--events is detected in where no DETECTIONS are given; give one or the other")
-    from jeat_graph.io.capture.addresses import is_live
+    from jeat_graph.io.files.addresses import is_live
     from jeat_graph.runs.run_options import RunOptions
     from jeat_graph.runs.track_files import TrackRequest, track_files
 
@@ -147,8 +147,8 @@ def _detected(args: argparse.Namespace) -> DetectedFile:
     from jeat_graph.cli.detect_command import detect_with_bar
     from jeat_graph.detection.before_tracking import DETECTIONS, detect_before
     from jeat_graph.detection.live_detecting import is_live_request
-    from jeat_graph.io.atomic import check_writable
-    from jeat_graph.io.outputs import check_folder
+    from jeat_graph.io.files.atomic import check_writable
+    from jeat_graph.io.files.outputs import check_folder
 
     if args.frames is None and args.events is None:
         raise DataError("nothing to track: give files of detections, or --frames, --events or both")
@@ -198,7 +198,7 @@ def _have_own_pictures(args: argparse.Namespace) -> bool:
 
 def _check_image(image: tuple[int, int], frames: str) -> None:
     """Refuse a size that is not that of the pictures to detect in: what is found there is in their pixels."""
-    from jeat_graph.io.video import peek
+    from jeat_graph.io.media.video import peek
 
     (width, height), _ = peek(frames)
     if image != (width, height):

@@ -27,7 +27,7 @@ from jeat_graph.detection.opencv_threads import one_thread
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import DetectionSettings, PictureSettings
-from jeat_graph.io.video import FrameSource, RgbImage, open_frames
+from jeat_graph.io.media.video import FrameSource, RgbImage, open_frames
 
 #: The network of the package that is tried: it knows highways.
 HIGHWAYS = "sehn"

@@ -54,8 +54,8 @@ def detect_before(
         ConfigError: a detector or a setting that is not known.
         DataError: a file cannot be read or written.
     """
-    from jeat_graph.io.detections_io import write_detections
-    from jeat_graph.io.locking import hold_made_folder
+    from jeat_graph.io.files.locking import hold_made_folder
+    from jeat_graph.io.tables.detections_io import write_detections
 
     request = resolved(request, say)
     declared = declared_settings(request, say) if declare else []
@@ -78,8 +78,8 @@ def detect_live_before(
 
     Args and errors as of `detect_before`; `until` tells when to end.
     """
-    from jeat_graph.io.detections_io import write_detections
-    from jeat_graph.io.locking import hold_made_folder
+    from jeat_graph.io.files.locking import hold_made_folder
+    from jeat_graph.io.tables.detections_io import write_detections
 
     found = out / DETECTIONS
     known: list[tuple[DetectRequest, tuple[int, int]]] = []

@@ -28,7 +28,7 @@ from jeat_graph.detection.settings import BESIDE_RATE_HZ
 
 if TYPE_CHECKING:
     from jeat_graph.io.events.reader import EventReader
-    from jeat_graph.io.video import FrameSource
+    from jeat_graph.io.media.video import FrameSource
 
     _Recording = tuple[EventReader, tuple[int, int]]
 
@@ -128,7 +128,7 @@ def detect_files(
 
 
 def _frames(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> FrameSource:
-    from jeat_graph.io.video import open_frames
+    from jeat_graph.io.media.video import open_frames
 
     assert request.frames is not None
     source = stack.enter_context(open_frames(request.frames, request.rate_hz))

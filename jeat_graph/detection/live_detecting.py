@@ -21,10 +21,10 @@ from jeat_graph.detection.live_workers import SLICE_S, EventWorker, PictureWorke
 from jeat_graph.detection.named import AUTO, MOTION
 from jeat_graph.detection.opencv_threads import one_thread
 from jeat_graph.detection.request import DetectRequest
-from jeat_graph.io.capture.addresses import events_address, frames_address, is_live
 from jeat_graph.io.capture.camera import open_camera
 from jeat_graph.io.capture.event_camera import open_event_camera
 from jeat_graph.io.capture.reader import Item, LiveStatus
+from jeat_graph.io.files.addresses import events_address, frames_address, is_live
 
 #: Scans that may wait for whoever takes them; then the detectors wait, and the cameras drop.
 _MOST_WAITING = 8

@@ -19,7 +19,7 @@ from jeat_graph.detection.request import DetectRequest
 from jeat_graph.io.capture.camera import LivePicture
 from jeat_graph.io.capture.event_camera import LivePiece
 from jeat_graph.io.capture.reader import Item, LiveReader
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 
 #: Between looks at whether to end (s).
 SLICE_S = 0.1

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.decoders import RgbImage
-from jeat_graph.io.marks import MASKS, Polygon, polygon_of, read_marks_file
+from jeat_graph.io.media.decoders import RgbImage
+from jeat_graph.io.tables.marks import MASKS, Polygon, polygon_of, read_marks_file
 
 #: A box is left out if more than this share of it lies in a mask.
 MOST_MASKED = 0.5

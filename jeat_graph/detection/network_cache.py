@@ -21,9 +21,9 @@ from jeat_graph.data.notes import note
 from jeat_graph.data.private_folder import is_private
 from jeat_graph.data.secrets import without_logins
 from jeat_graph.detection.known_networks import KnownNetwork
-from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.hashing import sha256_of
-from jeat_graph.io.locking import hold_file
+from jeat_graph.io.files.atomic import atomic_path
+from jeat_graph.io.files.hashing import sha256_of
+from jeat_graph.io.files.locking import hold_file
 
 FOLDER, MIRROR = "JEAT_GRAPH_NETWORKS", "JEAT_GRAPH_MIRROR"
 _MARK = ".sha256"

@@ -24,7 +24,7 @@ from jeat_graph.detection.components import Components, measured, without_inner
 from jeat_graph.detection.linking import linked, marked_pixels
 from jeat_graph.detection.memory import CloudMemory
 from jeat_graph.detection.settings import PictureSettings
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 
 # Standard deviation of a normal error, from its median absolute deviation.
 _SIGMA_PER_MAD = 1.4826

@@ -59,7 +59,7 @@ def write_plots(
     from matplotlib import pyplot as plt
 
     from jeat_graph.drawing.road_comparison import road_errors
-    from jeat_graph.io.atomic import atomic_path
+    from jeat_graph.io.files.atomic import atomic_path
 
     backend = mpl.get_backend()
     plt.switch_backend("agg")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.files.atomic import atomic_path
 
 if TYPE_CHECKING:
     from jeat_graph.runs.explaining import TrackMoment

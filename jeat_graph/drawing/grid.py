@@ -6,7 +6,7 @@ import numpy as np
 
 from jeat_graph.drawing.movie.lettering import letters, paint, room_for
 from jeat_graph.drawing.palette import Rgb
-from jeat_graph.io.video import RgbImage
+from jeat_graph.io.media.video import RgbImage
 
 #: Distances of lines (px) that are tried, and how many lines a picture has at most along its longer side.
 _STEPS, _MOST_LINES = (10, 20, 50, 100, 200, 500, 1000), 24

@@ -14,7 +14,7 @@ import numpy as np
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.extras import install
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.files.atomic import atomic_path
 
 TIMELINE = "time"
 _SPREAD = 2.0  # half axes of the drawn uncertainty, in standard deviations

@@ -22,7 +22,7 @@ def plot_speed(rows: Sequence[dict[str, Any]], path: str | Path) -> None:
     import matplotlib.pyplot as plt
     from matplotlib.ticker import FuncFormatter
 
-    from jeat_graph.io.atomic import atomic_path
+    from jeat_graph.io.files.atomic import atomic_path
 
     figure, axes = plt.subplots(figsize=(7.2, 4.6), dpi=130, layout="constrained")
     names = list(dict.fromkeys(row["tracker"] for row in rows))

@@ -1,1 +1,1 @@
-"""Reading and writing: one file a format."""
+"""Reading and writing: one file a format, in rooms by what is in the file."""

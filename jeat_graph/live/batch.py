@@ -11,8 +11,8 @@ from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.processes import available_cores
 from jeat_graph.detection.named import AUTO, MOTION
 from jeat_graph.detection.request import DetectRequest
-from jeat_graph.io.locking import hold_lock_file
-from jeat_graph.io.outputs import check_folder
+from jeat_graph.io.files.locking import hold_lock_file
+from jeat_graph.io.files.outputs import check_folder
 from jeat_graph.live.engines import ENGINES, run_local, run_on_ray
 from jeat_graph.live.manifest import ManifestRow
 from jeat_graph.live.recording_job import FAILED, Job, Outcome, run_job
@@ -148,7 +148,7 @@ def _network(name: str | None, usual: str) -> str:
 
 
 def _absolute(item: str) -> str:
-    from jeat_graph.io.detections_io import split_name
+    from jeat_graph.io.tables.detections_io import split_name
 
     name, path = split_name(item)
     return str(Path(path).resolve()) if name is None else f"{name}={Path(path).resolve()}"
@@ -227,7 +227,7 @@ def _write(
     folder: Path, outcomes: list[Outcome], scores: dict[str, dict[str, float]], judged: dict[str, Judgement]
 ) -> None:
     from jeat_graph.eval.tables import Cell, Table, to_json
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     records: list[dict[str, Cell]] = []
     for one in outcomes:
@@ -248,7 +248,7 @@ def _write(
 
 def _write_or_remove(path: Path, text: str) -> None:
     """Write a text, or remove what an earlier batch left there where there is none."""
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     if text:
         with open_atomic(path) as file:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.detection.live_detecting import LiveDetecting
-from jeat_graph.io.scan_batch import ScanBatch
-from jeat_graph.io.scan_lines import read_batches
-from jeat_graph.io.stream_reading import StreamReading
+from jeat_graph.io.streams.scan_batch import ScanBatch
+from jeat_graph.io.streams.scan_lines import read_batches
+from jeat_graph.io.streams.stream_reading import StreamReading
 from jeat_graph.live.interrupts import Interrupts
 from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.transport.ends import Source

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import BinaryIO, Self
 
-from jeat_graph.io.stream_text import line_reader
+from jeat_graph.io.streams.stream_text import line_reader
 
 #: After a signal a broker, or the rest of a line, is waited for no longer than this (s).
 GRACE_S = 0.5

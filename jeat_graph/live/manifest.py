@@ -15,7 +15,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import FIRST_FRAMES
 from jeat_graph.data.tables.frame_filling import SCORE_SCALES
 from jeat_graph.data.time_units import TIME_UNITS
-from jeat_graph.io.formats import FORMATS
+from jeat_graph.io.tables.formats import FORMATS
 
 #: Separates several files, or several settings, in one field.
 SEPARATOR = ";"
@@ -84,7 +84,7 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
         DataError: names the line and what is wrong: an unknown column, a name that is no file name or that
             stands there twice, no recording at all.
     """
-    from jeat_graph.io.tables import read_table
+    from jeat_graph.io.tables.file_tables import read_table
 
     known = (*COLUMNS, *READING_COLUMNS, *RAW_COLUMNS)
     table = read_table(path, (), optional=known)

@@ -1,8 +1,8 @@
 """Messages between a detector, the tracker and whoever wants the tracks: version 1, in two encodings.
 
 A message of scans is `{"v": 1, "source": "gantry7", "seq": 41, "scans": [scan, …]}`, each scan as in a line
-of `stream` (`io/scan_lines`), all of one time; `source` and `seq`, a whole number that rises by source, are
-what duplicates are told by. A scan, or a list of scans, alone is taken too. A message of tracks is
+of `stream` (`io.streams.scan_lines`), all of one time; `source` and `seq`, a whole number that rises by
+source, are what duplicates are told by. A scan, or a list of scans, alone is taken too. One of tracks is
 `{"v": 1, "seq": 7, "source": …, "of": 41, "t": …, "tracks": […]}`, where `source` and `of` say which message
 it answers. Both are JSON, or MessagePack of the same structure, which may hold boxes (M, 4) and scores (M,)
 as bytes: 64-bit floats, the lowest byte first.
@@ -18,9 +18,9 @@ import numpy as np
 
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.extras import install
-from jeat_graph.io.scan_batch import ScanBatch
-from jeat_graph.io.scan_lines import batch_of
-from jeat_graph.io.stream_reading import StreamReading
+from jeat_graph.io.streams.scan_batch import ScanBatch
+from jeat_graph.io.streams.scan_lines import batch_of
+from jeat_graph.io.streams.stream_reading import StreamReading
 from jeat_graph.live.memory import Memory, fingerprint
 
 VERSION = 1
@@ -87,7 +87,7 @@ def encode_tracks(line: str, seq: int, answered: ScanMessage | None, encoding: s
     """Make a message of tracks.
 
     Args:
-        line: the tracks as a line of JSON (`io/track_lines.json_line`).
+        line: the tracks as a line of JSON (`io/streams/track_lines.json_line`).
         seq: number of this message among those that go out.
         answered: the message that it answers, if it does.
         encoding: `json` or `msgpack`.

@@ -106,7 +106,7 @@ def _track(job: Job) -> None:
 
 def _finished(request: TrackRequest) -> dict[str, Any] | None:
     """The record of the run if it is there, whole, and what this request would make; else None."""
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.files.hashing import sha256_of
     from jeat_graph.version import __version__
 
     out = Path(request.out)

@@ -27,7 +27,7 @@ def with_detections(request: TrackRequest, raw: DetectRequest) -> TrackRequest:
     Raises:
         JeatGraphError: a file cannot be read, or a detector is not known.
     """
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     out = Path(request.out)
     origin = _origin(raw, request.config)
@@ -54,7 +54,7 @@ def with_detections(request: TrackRequest, raw: DetectRequest) -> TrackRequest:
 
 def _origin(raw: DetectRequest, config: str) -> dict[str, Any]:
     """Return what detections depend on: the files by their content, and all settings."""
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.files.hashing import sha256_of
 
     # Files count by their content, wherever they lie.
     settings = replace(raw, frames=raw.frames and "frames", events=raw.events and "events")

@@ -46,7 +46,7 @@ def drive_on_road(run: Path, camera_file: str) -> int:
     Raises:
         JeatGraphError: the camera, or a file of the run, is not valid.
     """
-    from jeat_graph.io.atomic import open_atomic
+    from jeat_graph.io.files.atomic import open_atomic
 
     vehicles = _write_road(run, camera_file)
     with open_atomic(run / ROAD / SOURCE) as file:
@@ -68,14 +68,14 @@ def run_tables(camera_file: str) -> Callable[[Path, Config], object]:
 
 
 def _origin(run: Path, camera_file: str) -> dict[str, str]:
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.files.hashing import sha256_of
     from jeat_graph.runs.directory import RUN_JSON
 
     return {"version": __version__, "camera": sha256_of(camera_file), "run": sha256_of(run / RUN_JSON)}
 
 
 def _write_road(run: Path, camera_file: str) -> int:
-    from jeat_graph.io.table_writer import write_columns
+    from jeat_graph.io.tables.table_writer import write_columns
     from jeat_graph.road.box_rows import BoxConfig
     from jeat_graph.road.boxes_road import follow_boxes
     from jeat_graph.road.camera_file import read_camera

@@ -7,7 +7,7 @@ from typing import BinaryIO, Self
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.track_lines import csv_header, csv_rows
+from jeat_graph.io.streams.track_lines import csv_header, csv_rows
 
 
 class SmoothedFile:

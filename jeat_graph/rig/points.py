@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.picture_map import PictureMap
-from jeat_graph.io.tables import read_table
+from jeat_graph.io.tables.file_tables import read_table
 from jeat_graph.rig.homography import LEAST_POINTS, covariance_of_fit, fit_homography
 
 # What was clicked is never more exact than this (px).

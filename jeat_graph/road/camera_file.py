@@ -13,8 +13,8 @@ import yaml
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import open_atomic
-from jeat_graph.io.csv_text import read_text
+from jeat_graph.io.files.atomic import open_atomic
+from jeat_graph.io.tables.csv_text import read_text
 from jeat_graph.road.camera import PARAMETERS, Georeference, RoadCamera
 
 _SIMPLE = ("fx", "fy", "cx", "cy")

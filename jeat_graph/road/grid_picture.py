@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.picture_file import read_picture
-from jeat_graph.io.pictures import as_png
+from jeat_graph.io.files.atomic import atomic_path
+from jeat_graph.io.media.picture_file import read_picture
+from jeat_graph.io.media.pictures import as_png
 from jeat_graph.road.camera import RoadCamera
 
 _ACROSS_M = np.arange(-21.0, 21.1, 3.5)

@@ -9,8 +9,8 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.marks import LANES, LINES, read_marks_file
-from jeat_graph.io.tables import read_table
+from jeat_graph.io.tables.file_tables import read_table
+from jeat_graph.io.tables.marks import LANES, LINES, read_marks_file
 from jeat_graph.road.evidence import Lengths, Points
 
 
@@ -102,7 +102,7 @@ class RoadMarks(NamedTuple):
 
 
 def read_marks(path: str | Path) -> RoadMarks:
-    """Read lines and lanes of a file of marks (`io.marks`).
+    """Read lines and lanes of a file of marks (`io.tables.marks`).
 
     Raises:
         DataError: names the key that is unknown or has other than finite numbers.

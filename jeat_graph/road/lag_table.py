@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.io.table_writer import csv_lines
+from jeat_graph.io.tables.table_writer import csv_lines
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal import CalibrationShare, columns_of_rows
 from jeat_graph.road.fixed_lag import RoadFixedLag, RoadLagConfig

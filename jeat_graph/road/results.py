@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.io.rounding import round_decimals, round_significant
+from jeat_graph.io.tables.rounding import round_decimals, round_significant
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.lanes import Lanes
 from jeat_graph.road.speeds import KMH, Speed, Vehicle
@@ -165,7 +165,7 @@ def crossing_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
 
 def write_result(result: RoadResult, folder: str | Path) -> None:
     """Write `road.csv`, `speeds.csv` and `crossings.csv` into a folder, each whole or not at all."""
-    from jeat_graph.io.table_writer import TableWriter, write_columns
+    from jeat_graph.io.tables.table_writer import TableWriter, write_columns
 
     with TableWriter(Path(folder) / "road.csv") as writer:
         if not result.vehicles:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from jeat_graph.drawing.page.document import table_html
 from jeat_graph.drawing.page.head import beside, page_head
 from jeat_graph.eval.tables import Cell, Table
-from jeat_graph.io.atomic import open_atomic
+from jeat_graph.io.files.atomic import open_atomic
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.report import camera_lines
 from jeat_graph.road.results import RoadResult

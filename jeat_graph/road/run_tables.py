@@ -12,9 +12,9 @@ import numpy.typing as npt
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.measurements_io import read_measurements
-from jeat_graph.io.table_writer import TableWriter
-from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.io.tables.measurements_io import read_measurements
+from jeat_graph.io.tables.table_writer import TableWriter
+from jeat_graph.io.tables.trajectories_io import read_trajectories
 from jeat_graph.road.box_rows import BoxConfig
 from jeat_graph.road.boxes_road import SizedVehicle, follow_boxes
 from jeat_graph.road.camera import RoadCamera

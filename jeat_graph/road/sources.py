@@ -12,8 +12,8 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.eval.load import recording_span
-from jeat_graph.io.trajectories_io import read_trajectories
-from jeat_graph.io.yolo_labels import is_label_folder
+from jeat_graph.io.tables.trajectories_io import read_trajectories
+from jeat_graph.io.tables.yolo_labels import is_label_folder
 from jeat_graph.road.box_rows import BoxConfig
 from jeat_graph.road.boxes_road import TrackBoxes, boxes_of_table
 from jeat_graph.road.camera import RoadCamera
@@ -122,7 +122,7 @@ def only_points(path: Path) -> bool:
             return "left" not in parquet.read_schema(path).names
         except (ArrowException, OSError):
             return False
-    from jeat_graph.io.csv_text import read_text
+    from jeat_graph.io.tables.csv_text import read_text
 
     head = read_text(path).lstrip()[:4096].splitlines()[0].decode("utf-8", errors="replace")
     names = [name.strip() for name in head.split(",")]

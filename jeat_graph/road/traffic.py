@@ -14,7 +14,7 @@ import numpy.typing as npt
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.eval.counting import interval_edges
-from jeat_graph.io.rounding import round_decimals
+from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.results import RoadResult
 from jeat_graph.road.speeds import KMH, Z95, Vehicle

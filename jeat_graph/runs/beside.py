@@ -38,7 +38,7 @@ def facts_of_frames(frames: str | Path) -> Facts:
     Raises:
         DataError: it cannot be read.
     """
-    from jeat_graph.io.video import peek
+    from jeat_graph.io.media.video import peek
 
     size_px, rate_hz = peek(frames)
     return Facts(size_px, rate_hz, str(frames))
@@ -50,8 +50,8 @@ def facts_beside(paths: Sequence[str | Path]) -> Facts | None:
     Raises:
         DataError: a file cannot be read.
     """
-    from jeat_graph.io.formats import recognise
-    from jeat_graph.io.motchallenge import sequence_info
+    from jeat_graph.io.tables.formats import recognise
+    from jeat_graph.io.tables.motchallenge import sequence_info
 
     found = []
     for path in paths:
@@ -101,7 +101,7 @@ def rate_of_truth(run: str | Path, truth: str | Path, rate_hz: float | None) -> 
     Raises:
         DataError: the user's rate is not that of `seqinfo.ini` beside the truth, or of the run's input.
     """
-    from jeat_graph.io.formats import counts_frames, recognise
+    from jeat_graph.io.tables.formats import counts_frames, recognise
 
     kind = recognise(truth)
     counts = kind != "kitti" and counts_frames(truth, kind)

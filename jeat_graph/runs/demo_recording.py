@@ -17,8 +17,8 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.truth_io import read_truth
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.truth_io import read_truth
 
 DETECTIONS, TRUTH, PICTURE = "detections.csv.gz", "gt.csv.gz", "picture.json"
 

@@ -12,10 +12,10 @@ from types import TracebackType
 from typing import Any, Self
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.beside import check_beside
-from jeat_graph.io.locking import hold_folder, remove_folders
-from jeat_graph.io.outputs import check_folder
-from jeat_graph.io.scans_io import SCANS
+from jeat_graph.io.files.beside import check_beside
+from jeat_graph.io.files.locking import hold_folder, remove_folders
+from jeat_graph.io.files.outputs import check_folder
+from jeat_graph.io.tables.scans_io import SCANS
 
 RUN_JSON = "run.json"
 #: Folder with the state of a run that is not finished (`runs/unfinished.py`).

@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, UnknownSensorError
-from jeat_graph.io.time_units import LONGEST_STEP_S, unit_question
+from jeat_graph.io.tables.time_units import LONGEST_STEP_S, unit_question
 from jeat_graph.runs.clocks import check_clocks, wrong_times
 from jeat_graph.runs.declaring import LEAST_SCANS, scan_rate_hz
 from jeat_graph.tracking.input_watch import CORNERS, SHARES, look_like_corners, look_like_shares

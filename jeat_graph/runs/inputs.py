@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.beside import lies_beside
+from jeat_graph.io.files.beside import lies_beside
 
 # An input that was moved along is looked for so far up from the run, by so many last parts of its path.
 _MOST_UP, _MOST_PARTS = 4, 4
@@ -21,7 +21,7 @@ def describe_inputs(paths: Sequence[str | Path]) -> list[dict[str, Any]]:
     Raises:
         DataError: a file cannot be read.
     """
-    from jeat_graph.io.hashing import sha256_of, size_of
+    from jeat_graph.io.files.hashing import sha256_of, size_of
 
     return [
         {
@@ -45,8 +45,8 @@ def check_distinct(items: Sequence[str | Path]) -> None:
     Raises:
         DataError: names the file, and the other where it is a copy.
     """
-    from jeat_graph.io.detections_io import split_name
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.files.hashing import sha256_of
+    from jeat_graph.io.tables.detections_io import split_name
 
     found = [_Given.of(name, Path(path)) for name, path in map(split_name, items)]
     # Each file is asked for its place and size once, and read only beside another of its size.
@@ -93,7 +93,7 @@ def find_input(given: str | Path, record: Mapping[str, Any], folder: Path) -> Pa
     Raises:
         DataError: there is such a file, but it does not lie beside the run.
     """
-    from jeat_graph.io.hashing import sha256_of, size_of
+    from jeat_graph.io.files.hashing import sha256_of, size_of
 
     # A folder of labels is an input, too.
     found = [place for place in dict.fromkeys(_places(Path(given), record, folder)) if place.exists()]

@@ -14,8 +14,8 @@ from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.io.beside import check_beside
-from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.files.beside import check_beside
+from jeat_graph.io.files.hashing import sha256_of
 from jeat_graph.rig.common_picture import by_recorded_ways
 from jeat_graph.runs.directory import MEASUREMENTS, RUN_JSON, read_record
 from jeat_graph.runs.inputs import find_input
@@ -108,7 +108,7 @@ def measurement_rows(folder: Path, *, progress: bool = False) -> tuple[RecordArr
     Raises:
         DataError: there is no run, or a file of it, or an input, is missing or has changed since.
     """
-    from jeat_graph.io.measurements_io import read_measurements
+    from jeat_graph.io.tables.measurements_io import read_measurements
     from jeat_graph.tracking.records import record_measurements
 
     record = complete_record(folder)
@@ -176,7 +176,7 @@ def recorded_inputs(
     Raises:
         DataError: an input is missing or has changed since.
     """
-    from jeat_graph.io.detections_io import read_many, split_name
+    from jeat_graph.io.tables.detections_io import read_many, split_name
 
     path = folder / RUN_JSON
     config = _config_of(folder, record)

@@ -15,7 +15,7 @@ from jeat_graph.data.progress import progress_span
 from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.judge import Judgement
-from jeat_graph.io.beside import check_beside
+from jeat_graph.io.files.beside import check_beside
 from jeat_graph.runs.directory import DIAGNOSTICS, read_record
 
 
@@ -89,7 +89,7 @@ def load_run_data(
     """
     from jeat_graph.eval.judge import judge_runs
     from jeat_graph.eval.load import load_run, tables_of
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
 
     folder = Path(run)
     files = tables_of(folder)
@@ -128,7 +128,7 @@ _NO_TRUTH = "No truth was given (--gt FILE): there are no scores."
 
 
 def _read_diagnostics(folder: Path) -> Diagnostics | None:
-    from jeat_graph.io.diagnostics_io import read_diagnostics
+    from jeat_graph.io.tables.diagnostics_io import read_diagnostics
 
     path = folder / DIAGNOSTICS
     check_beside(path, folder)

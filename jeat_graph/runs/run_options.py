@@ -9,7 +9,7 @@ from typing import Any
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.io.formats import BY_FRAME
+from jeat_graph.io.tables.formats import BY_FRAME
 
 EXTRA_FORMATS = ("parquet", *BY_FRAME)
 

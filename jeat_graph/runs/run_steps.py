@@ -17,8 +17,8 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, InputWarning
 from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.progress import refreshing
-from jeat_graph.io.formats import BY_FRAME
-from jeat_graph.io.piecewise import PiecewiseWriter
+from jeat_graph.io.files.piecewise import PiecewiseWriter
+from jeat_graph.io.tables.formats import BY_FRAME
 from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
@@ -197,9 +197,9 @@ class _Files(ExitStack):
     """
 
     def __init__(self, run: RunDirectory, config: Config, options: RunOptions, named: bool) -> None:
-        from jeat_graph.io.diagnostics_io import DiagnosticsWriter
-        from jeat_graph.io.measurements_io import MeasurementWriter
-        from jeat_graph.io.trajectories_io import TrajectoryWriter
+        from jeat_graph.io.tables.diagnostics_io import DiagnosticsWriter
+        from jeat_graph.io.tables.measurements_io import MeasurementWriter
+        from jeat_graph.io.tables.trajectories_io import TrajectoryWriter
 
         super().__init__()
         suffixes = [SUFFIXES[name] for name in ("csv", *options.formats) if name not in BY_FRAME]

@@ -33,7 +33,7 @@ class TrackRequest:
         classes: classes of detections to be taken, and those without one; None takes all.
         first_frame: number of the first frame of files that count frames, or None for the usual rule.
         video: the one that is read of a file's several videos, or None.
-        class_names: names of classes that files number, as `io.class_names` takes them from a command.
+        class_names: names of classes that files number, as `io.tables.class_names` takes them from a command.
         image: size of the picture (px) for boxes in shares of it; None for that of the configuration.
         frames: pictures that tell the picture's size and the frame rate, or None.
         rig: file with the pictures and clocks of the sensors, or None.
@@ -63,7 +63,7 @@ class TrackRequest:
     @property
     def files(self) -> list[str]:
         """Paths of the detections, without the sensors' names."""
-        from jeat_graph.io.detections_io import split_name
+        from jeat_graph.io.tables.detections_io import split_name
 
         return [str(split_name(item)[1]) for item in self.detections]
 
@@ -154,8 +154,8 @@ def track_files(
     Raises:
         JeatGraphError: the configuration or a file is not valid, or they do not fit together.
     """
-    from jeat_graph.io.detections_io import of_class_in, read_many
-    from jeat_graph.io.formats import recognise
+    from jeat_graph.io.tables.detections_io import of_class_in, read_many
+    from jeat_graph.io.tables.formats import recognise
     from jeat_graph.rig.common_picture import in_common, recorded_ways
     from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input

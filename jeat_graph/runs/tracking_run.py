@@ -11,8 +11,8 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.eval.frames import Kind
-from jeat_graph.io.formats import BY_FRAME
-from jeat_graph.io.scans_io import SCANS, write_scans
+from jeat_graph.io.tables.formats import BY_FRAME
+from jeat_graph.io.tables.scans_io import SCANS, write_scans
 from jeat_graph.runs.directory import RUN_JSON, SUFFIXES, RunDirectory
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.run_steps import RunSteps
@@ -55,8 +55,8 @@ def _write_at_frames(
     run: RunDirectory, kind: Kind, instants: FloatArray, rate_hz: float, formats: Sequence[str]
 ) -> None:
     """Write a table at the frames of formats that count them: from its CSV, as anybody would later."""
-    from jeat_graph.io.frame_results import write_kitti, write_motchallenge
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.exports.frame_results import write_kitti, write_motchallenge
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
     from jeat_graph.runs.frame_export import at_frames
 
     wanted = [name for name in formats if name in BY_FRAME]
@@ -76,8 +76,8 @@ def _frame_rate(detections: Detections, config: Config, options: RunOptions) -> 
 
 def _write_record(detections: Detections, config: Config, run: RunDirectory, record: RunRecord) -> None:
     from jeat_graph.eval.tables import to_json
-    from jeat_graph.io.atomic import open_atomic
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.files.atomic import open_atomic
+    from jeat_graph.io.files.hashing import sha256_of
 
     scan_sensor, boxes = detections.scan_sensor, np.diff(detections.scan_start)
     per_sensor = {

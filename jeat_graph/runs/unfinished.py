@@ -15,7 +15,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import DataError, JeatGraphError, OtherRunError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.packing import pack, plain_codec, unpack
+from jeat_graph.io.files.packing import pack, plain_codec, unpack
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
 

@@ -14,8 +14,8 @@ from jeat_graph.config.reading import config_from_dict, config_to_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.io.packing import Codec, pack, plain_codec, unpack
-from jeat_graph.io.state_file import read_state_file, write_state_file
+from jeat_graph.io.files.packing import Codec, pack, plain_codec, unpack
+from jeat_graph.io.files.state_file import read_state_file, write_state_file
 from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage

@@ -13,7 +13,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import InputWarning
-from jeat_graph.io.time_units import LONGEST_STEP_S, likely_unit
+from jeat_graph.io.tables.time_units import LONGEST_STEP_S, likely_unit
 
 #: Boxes after which a first opinion is formed, and after which the watch ends.
 FIRST_BOXES, LAST_BOXES = 20, 200

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from jeat_graph.io.detections_io import write_detections
-from jeat_graph.io.truth_io import write_truth
+from jeat_graph.io.tables.detections_io import write_detections
+from jeat_graph.io.tables.truth_io import write_truth
 from jeat_graph.runs.demo_recording import DETECTIONS, PICTURE, TRUTH, DemoRecording
 from jeat_graph_sehn.functions import record_demo
 

@@ -68,8 +68,8 @@ def test_boxes_that_a_detector_has_clipped_to_nothing_are_left_out():
 
 
 def test_tracking_and_judging_take_objects_or_files(night, tmp_path):
-    from jeat_graph.io.detections_io import write_detections
-    from jeat_graph.io.truth_io import write_truth
+    from jeat_graph.io.tables.detections_io import write_detections
+    from jeat_graph.io.tables.truth_io import write_truth
 
     detections, truth = night
     tracks = track(detections, load_config("default"))
@@ -85,7 +85,7 @@ def test_tracking_and_judging_take_objects_or_files(night, tmp_path):
 
 def test_a_run_is_read_back(night, tmp_path):
     from jeat_graph.cli.main import main
-    from jeat_graph.io.detections_io import write_detections
+    from jeat_graph.io.tables.detections_io import write_detections
 
     write_detections(night[0], tmp_path / "detections.csv")
     assert main(["track", str(tmp_path / "detections.csv"), "--out", str(tmp_path / "run")]) == 0

@@ -13,8 +13,8 @@ from benchmarks.detection import only_moved
 from benchmarks.raw_segments import segments_in
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.events_dsec_writer import EventWriter
-from jeat_graph.io.truth_io import write_truth
+from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.tables.truth_io import write_truth
 
 from ..detection.moving import SIZE, box_at, events_of, picture_of
 

@@ -11,8 +11,8 @@ import pytest
 
 from benchmarks.__main__ import build_parser, main
 from benchmarks.recordings import simulated
-from jeat_graph.io.detections_io import write_detections
-from jeat_graph.io.truth_io import write_truth
+from jeat_graph.io.tables.detections_io import write_detections
+from jeat_graph.io.tables.truth_io import write_truth
 
 FEW = ["--set", "tracker.engine=core", "--no-peers", "--jobs", "1"]
 

@@ -7,8 +7,8 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
-from jeat_graph.io.detections_io import write_detections
-from jeat_graph.io.truth_io import write_truth
+from jeat_graph.io.tables.detections_io import write_detections
+from jeat_graph.io.tables.truth_io import write_truth
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_the_size_of_the_picture_is_taken_over(files, tmp_path):
 
 
 def test_a_video_says_the_size_of_the_picture_and_the_rate(files, tmp_path):
-    from jeat_graph.io.video_writer import FrameWriter
+    from jeat_graph.io.media.video_writer import FrameWriter
 
     with FrameWriter(tmp_path, "lossless", (1300, 730), 25.0) as writer:
         for k in range(3):

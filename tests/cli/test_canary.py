@@ -90,7 +90,7 @@ def test_a_stranger_s_run_has_no_file_read_that_the_user_did_not_name(
     place, recording, tmp_path, capfd, small_plots
 ):
     """What `run.json` names may be anybody's: nothing of it is shown."""
-    from jeat_graph.io.hashing import sha256_of
+    from jeat_graph.io.files.hashing import sha256_of
 
     run, private = tmp_path / "a/b/c/d/run", tmp_path / "private" / "canary.csv"  # nowhere near
     private.parent.mkdir()

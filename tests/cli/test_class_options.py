@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.io.tables.trajectories_io import read_trajectories
 
 STEPS = 40
 

@@ -12,8 +12,8 @@ import pytest
 from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
 from jeat_graph.detection.declared import declared_of
-from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events.evt3_writer import Evt3Writer
+from jeat_graph.io.tables.detections_io import read_detections
 
 from ..detection.moving import SIZE, box_at, events_of, iou, picture_of
 

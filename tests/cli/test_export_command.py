@@ -10,7 +10,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.trajectories_io import write_trajectories
+from jeat_graph.io.tables.trajectories_io import write_trajectories
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 
 from jeat_graph import evaluate
 from jeat_graph.cli.main import main
-from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.io.tables.trajectories_io import read_trajectories
 
 HZ = 20
 FRAMES = 30

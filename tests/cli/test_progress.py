@@ -27,8 +27,8 @@ from jeat_graph.drawing.page.document import render_page
 from jeat_graph.eval.compare import compare
 from jeat_graph.io.events.evt3_writer import Evt3Writer
 from jeat_graph.io.events.opening import open_events
-from jeat_graph.io.truth_io import read_truth
-from jeat_graph.io.video_writer import FrameWriter
+from jeat_graph.io.media.video_writer import FrameWriter
+from jeat_graph.io.tables.truth_io import read_truth
 from jeat_graph.runs.measured import measured_run
 from jeat_graph.runs.recorded import load_run_data
 

@@ -139,12 +139,12 @@ def alive(pid: int) -> bool:
 
 
 def test_a_folder_that_cannot_be_written_is_noticed_before_the_work(tmp_path, monkeypatch):
-    from jeat_graph.io.atomic import check_writable
+    from jeat_graph.io.files.atomic import check_writable
 
     def refuse(*args: object, **options: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("jeat_graph.io.atomic.tempfile.TemporaryFile", refuse)
+    monkeypatch.setattr("jeat_graph.io.files.atomic.tempfile.TemporaryFile", refuse)
     with pytest.raises(DataError, match="cannot be written: Permission denied"):
         check_writable(tmp_path / "deep" / "er" / "config.yaml")
     assert list(tmp_path.iterdir()) == []

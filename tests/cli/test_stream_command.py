@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.trajectories_io import MEAN, VAR, read_trajectories
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.trajectories_io import MEAN, VAR, read_trajectories
 
 COMMAND = [sys.executable, "-m", "jeat_graph.cli.main", "stream"]
 PATIENCE_S = 120.0
@@ -133,7 +133,7 @@ def test_csv_out_is_byte_for_byte_the_causal_table_of_track(joint_lines, tracked
 def test_csv_in_and_out_is_the_causal_table_too(
     recording, detections, tracked, monkeypatch, capsys, tmp_path
 ):
-    from jeat_graph.io.detections_io import write_detections
+    from jeat_graph.io.tables.detections_io import write_detections
 
     write_detections(detections, tmp_path / "ordered.csv")
     text = (tmp_path / "ordered.csv").read_bytes()
@@ -371,8 +371,8 @@ def test_a_checkpoint_goes_on_with_the_same_answer_to_late_scans_or_not_at_all(m
 
 
 def test_a_line_that_never_ends_is_passed_over_in_bounded_memory(monkeypatch, capsys):
-    monkeypatch.setattr("jeat_graph.io.stream_text.LONGEST_LINE", 1000)
-    monkeypatch.setattr("jeat_graph.io.stream_text._REST", 64)
+    monkeypatch.setattr("jeat_graph.io.streams.stream_text.LONGEST_LINE", 1000)
+    monkeypatch.setattr("jeat_graph.io.streams.stream_text._REST", 64)
     text = line(1.0) + "[" * 100_000 + "\n" + line(1.1)
     code, out, err = stream(text, monkeypatch, capsys, "--on-error", "skip")
     assert code == 0

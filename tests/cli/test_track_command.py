@@ -10,9 +10,9 @@ import pytest
 from jeat_graph.cli.main import main
 from jeat_graph.config.reading import config_from_dict, load_config
 from jeat_graph.eval.resampling import predict_to
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.hashing import sha256_of
-from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.io.files.hashing import sha256_of
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.trajectories_io import read_trajectories
 from jeat_graph.tracking.whole import track
 
 STEADY = [f"{k * 0.05:.2f},rgb,{100 + 2 * k},200,40,30,0.95" for k in range(30)]

@@ -11,7 +11,7 @@ import sys
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.locking import hold_file, hold_folder
+from jeat_graph.io.files.locking import hold_file, hold_folder
 
 pytest.importorskip("fcntl")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.io.tables.trajectories_io import read_trajectories
 
 HEADER = "t,sensor,left,top,width,height,score\n"
 

@@ -12,7 +12,7 @@ from jeat_graph.config.reading import config_from_dict, config_to_dict, load_con
 from jeat_graph.config.schema import Config, LiveConfig, PaperConfig, SensorConfig
 from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.io.config_io import save_config
+from jeat_graph.io.files.config_io import save_config
 
 
 def write(tmp_path, text, name="my.yaml"):

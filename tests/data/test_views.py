@@ -47,7 +47,7 @@ def test_a_missing_column_is_named(table):
 
 
 def test_a_frame_of_the_written_table_is_read(tmp_path, table):
-    from jeat_graph.io.trajectories_io import write_trajectories
+    from jeat_graph.io.tables.trajectories_io import write_trajectories
 
     write_trajectories(table, tmp_path / "causal.csv")
     back = Trajectories.from_pandas(pd.read_csv(tmp_path / "causal.csv"))

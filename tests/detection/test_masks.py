@@ -110,7 +110,7 @@ def test_what_is_no_clock_is_none(how):
 def test_the_clock_of_a_street_is_found_and_its_shop_windows_are_not():
     if not STREET.is_dir():
         pytest.skip(f"{STREET} is not there")
-    from jeat_graph.io.video import open_frames
+    from jeat_graph.io.media.video import open_frames
 
     for name, expected in (("cars-cyclist", (253, 0, 260, 29)), ("from-above", None)):
         with open_frames(STREET / f"{name}.mp4") as source:

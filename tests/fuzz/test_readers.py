@@ -15,11 +15,11 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.detections_io import read_detections, write_detections
-from jeat_graph.io.events_dsec import EventFile
-from jeat_graph.io.scan_lines import read_batches
-from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
-from jeat_graph.io.truth_io import read_truth, write_truth
+from jeat_graph.io.events.dsec_hdf5 import EventFile
+from jeat_graph.io.streams.scan_lines import read_batches
+from jeat_graph.io.tables.detections_io import read_detections, write_detections
+from jeat_graph.io.tables.trajectories_io import read_trajectories, write_trajectories
+from jeat_graph.io.tables.truth_io import read_truth, write_truth
 from jeat_graph.live.manifest import read_manifest
 from jeat_graph.tracking.tracker import Tracker
 
@@ -187,7 +187,7 @@ def test_a_line_of_a_gigabyte_is_one_line_in_bounded_memory(tmp_path, name):
         for _ in range(1024):
             file.write(b"1" * mib)
     script = (
-        "import resource, sys; from jeat_graph.io.detections_io import read_detections\n"
+        "import resource, sys; from jeat_graph.io.tables.detections_io import read_detections\n"
         "try: read_detections(sys.argv[1], rate_hz=10.0)\n"
         "except Exception as error: print(type(error).__name__, len(str(error)))\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"

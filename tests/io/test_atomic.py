@@ -7,7 +7,7 @@ import os
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import atomic_path, open_atomic
+from jeat_graph.io.files.atomic import atomic_path, open_atomic
 
 
 def test_the_file_appears_with_its_content_and_leaves_nothing_beside(tmp_path):

@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.io.capture.addresses import events_address, frames_address, is_live
 from jeat_graph.io.capture.back_off import BackOff
 from jeat_graph.io.capture.reader import LiveReader, LostError
 from jeat_graph.io.capture.stream_clock import StreamClock
 from jeat_graph.io.capture.wall_clock import WallClock
 from jeat_graph.io.events.opening import open_events
-from jeat_graph.io.video import open_frames, peek
+from jeat_graph.io.files.addresses import events_address, frames_address, is_live
+from jeat_graph.io.media.video import open_frames, peek
 
 
 def times(stamps, arrivals, clock=None):

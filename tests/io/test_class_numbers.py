@@ -9,10 +9,10 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.cvat import write_cvat
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.trajectories_io import read_trajectories
-from jeat_graph.io.truth_io import read_truth
+from jeat_graph.io.exports.cvat import write_cvat
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.trajectories_io import read_trajectories
+from jeat_graph.io.tables.truth_io import read_truth
 
 #: A car, a truck and a bus, numbered by a tracker whose classes are those of COCO, from 1.
 TRACKER = "1,1,1,2,3,4,0.7,3,-1\n1,2,9,2,3,4,0.6,8,-1\n1,3,9,9,3,4,0.6,6,-1\n"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.formats import recognise
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.formats import recognise
 
 MOT = "1,-1,10,20,30,40,0.9,-1,-1,-1\n4,-1,11,21,31,41,0.8,-1,-1,-1\n"
 KITTI = (

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.detections_io import read_detections, read_many, write_detections
+from jeat_graph.io.tables.detections_io import read_detections, read_many, write_detections
 
 HEADER = "t,sensor,left,top,width,height,score"
 ROW = "0.5,rgb,1,2,3,4,0.9"

@@ -11,14 +11,14 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.events_dsec_writer import EventWriter
-from jeat_graph.io.video import open_frames, peek
+from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.media.video import open_frames, peek
 
 WITHOUT_PLUGIN = """
 import sys
 sys.modules["hdf5plugin"] = None
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events.dsec_hdf5 import EventFile
 try:
     with EventFile(sys.argv[1]) as file:
         file.between(0, 10_000)

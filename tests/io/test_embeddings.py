@@ -10,8 +10,8 @@ from pyarrow import parquet
 from jeat_graph import Tracker
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.detections_io import read_detections, write_detections
-from jeat_graph.io.scan_lines import batch_of
+from jeat_graph.io.streams.scan_lines import batch_of
+from jeat_graph.io.tables.detections_io import read_detections, write_detections
 
 HEADER = "t,sensor,left,top,width,height,score,embedding\n"
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io import events_dsec_writer
-from jeat_graph.io.events_dsec import EventFile
-from jeat_graph.io.events_dsec_writer import COMPRESSIONS, EventWriter
+from jeat_graph.io.events import dsec_writer as events_dsec_writer
+from jeat_graph.io.events.dsec_hdf5 import EventFile
+from jeat_graph.io.events.dsec_writer import COMPRESSIONS, EventWriter
 
 SIZE = (64, 48)
 

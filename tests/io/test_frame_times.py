@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.frame_times import times_in_names, unit_of_whole
-from jeat_graph.io.video import open_frames, peek
+from jeat_graph.io.media.frame_times import times_in_names, unit_of_whole
+from jeat_graph.io.media.video import open_frames, peek
 from tests.io.variable_rate import write_variable as video
 from tests.io.variable_rate import write_video
 

@@ -10,9 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.trajectories_io import COLUMNS, read_trajectories
-from jeat_graph.io.truth_io import read_truth
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.trajectories_io import COLUMNS, read_trajectories
+from jeat_graph.io.tables.truth_io import read_truth
 
 NAMES = ["f.csv", "f.txt", "f.parquet", "f.npy", "f.json", "f"]
 HEADERS = [

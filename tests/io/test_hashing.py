@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.files.hashing import sha256_of
 
 
 def test_the_checksum_is_that_of_the_standard(write):

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
-from jeat_graph.io.hdf5_chunks import read_chunks
+from jeat_graph.io.events.hdf5_chunks import read_chunks
 
 pytest.importorskip("zlib_ng")
 ROWS = 1000

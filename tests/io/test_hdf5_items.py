@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.events_dsec import EventFile
-from jeat_graph.io.hdf5_items import reading_error
+from jeat_graph.io.events.dsec_hdf5 import EventFile
+from jeat_graph.io.events.hdf5_items import reading_error
 
 COLUMNS = {"x": np.uint16, "y": np.uint16, "p": np.uint8, "t": np.uint32}
 

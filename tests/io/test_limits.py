@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io import limits
-from jeat_graph.io.csv_text import read_bytes
-from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.files import limits
+from jeat_graph.io.tables.csv_text import read_bytes
+from jeat_graph.io.tables.detections_io import read_detections
 
 HEADER = "t,sensor,left,top,width,height,score"
 

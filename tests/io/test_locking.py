@@ -10,8 +10,8 @@ import sys
 import pytest
 
 from jeat_graph.data.errors import DataError, InputWarning
-from jeat_graph.io.atomic import open_atomic
-from jeat_graph.io.locking import hold_file, hold_folder, hold_made_folder
+from jeat_graph.io.files.atomic import open_atomic
+from jeat_graph.io.files.locking import hold_file, hold_folder, hold_made_folder
 from jeat_graph.runs.directory import RunDirectory
 
 pytest.importorskip("fcntl")
@@ -73,7 +73,7 @@ def test_the_next_run_takes_away_what_a_killed_one_left(tmp_path):
 def test_the_next_file_takes_away_what_a_killed_process_left_of_it(tmp_path):
     path = tmp_path / "a[1].html"
     (tmp_path / ".a[1].mine.html").write_text("a user's own", encoding="utf-8")
-    kill_within("io.atomic", "open_atomic", f"open_atomic({str(path)!r})", "thing.write('half')")
+    kill_within("io.files.atomic", "open_atomic", f"open_atomic({str(path)!r})", "thing.write('half')")
     assert len(list(tmp_path.iterdir())) == 2
     with open_atomic(path) as file:
         file.write("whole")
@@ -94,7 +94,7 @@ def test_a_name_that_is_not_utf8_can_be_written_into_json(tmp_path):
 HOLDING = """
 import sys
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.locking import hold_file
+from jeat_graph.io.files.locking import hold_file
 try:
     with hold_file(sys.argv[1]) as held:
         print(held, flush=True)

@@ -7,7 +7,7 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.io.measurements_io import COLUMNS, MeasurementWriter, read_measurements
+from jeat_graph.io.tables.measurements_io import COLUMNS, MeasurementWriter, read_measurements
 
 SENSORS = ("events", "rgb")
 

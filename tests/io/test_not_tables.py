@@ -8,11 +8,11 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events.evt3_writer import Evt3Writer
 from jeat_graph.io.events.opening import open_events
-from jeat_graph.io.video import peek
-from jeat_graph.io.video_writer import FrameWriter
+from jeat_graph.io.media.video import peek
+from jeat_graph.io.media.video_writer import FrameWriter
+from jeat_graph.io.tables.detections_io import read_detections
 
 
 def write_raw(path):

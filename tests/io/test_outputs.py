@@ -3,7 +3,7 @@
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.outputs import check_folder, check_keeps
+from jeat_graph.io.files.outputs import check_folder, check_keeps
 
 
 def test_a_file_is_no_folder(tmp_path):

@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as hnp
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.io.packing import pack, plain_codec, unpack
+from jeat_graph.io.files.packing import pack, plain_codec, unpack
 
 
 class Point(NamedTuple):

@@ -11,9 +11,9 @@ from pyarrow import parquet
 
 from jeat_graph.data.column_names import usual_names
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.time_units import unit_question
-from jeat_graph.io.truth_io import read_truth
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.time_units import unit_question
+from jeat_graph.io.tables.truth_io import read_truth
 
 PLAIN = "t,sensor,left,top,width,height,score\n0.5,rgb,10.5,20,30,40,0.9\n0.55,rgb,,,,,\n"
 

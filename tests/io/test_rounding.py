@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from jeat_graph.io.rounding import round_decimals, round_significant
+from jeat_graph.io.tables.rounding import round_decimals, round_significant
 
 
 @given(st.floats(1e-14, 1e14) | st.floats(-1e14, -1e-14))

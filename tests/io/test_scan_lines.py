@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.tables.reading import Reading
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.scan_lines import batch_of, read_batches
-from jeat_graph.io.stream_reading import StreamReading
+from jeat_graph.io.streams.scan_lines import batch_of, read_batches
+from jeat_graph.io.streams.stream_reading import StreamReading
+from jeat_graph.io.tables.detections_io import read_detections
 
 FLAT = {
     "t": 0.5,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.table_writer import TableWriter, write_columns
+from jeat_graph.io.tables.table_writer import TableWriter, write_columns
 
 
 def test_text_is_quoted_only_where_it_must_be(tmp_path):

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.csv_text import line_at
-from jeat_graph.io.tables import read_table
+from jeat_graph.io.tables.csv_text import line_at
+from jeat_graph.io.tables.file_tables import read_table
 
 PLAIN = "a,b,name\n1,2,x\n3,4,y\n"
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.frame_results import write_kitti, write_motchallenge
-from jeat_graph.io.trajectories_io import (
+from jeat_graph.io.exports.frame_results import write_kitti, write_motchallenge
+from jeat_graph.io.tables.trajectories_io import (
     COLUMNS,
     TrajectoryWriter,
     read_trajectories,

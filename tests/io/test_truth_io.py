@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.truth_io import read_truth, write_truth
+from jeat_graph.io.tables.truth_io import read_truth, write_truth
 
 HEADER = "t,object_id,left,top,width,height"
 ROW = "0.5,7,1,2,3,4"

@@ -16,11 +16,11 @@ from pyarrow import parquet
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
-from jeat_graph.io import unpacking
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.picture_file import MOST_PIXELS, read_picture
-from jeat_graph.io.unpacking import LEAST_ROOM, MOST_TIMES, check_unpacked, most_unpacked
-from jeat_graph.io.video import open_frames
+from jeat_graph.io.files import unpacking
+from jeat_graph.io.files.unpacking import LEAST_ROOM, MOST_TIMES, check_unpacked, most_unpacked
+from jeat_graph.io.media.picture_file import MOST_PIXELS, read_picture
+from jeat_graph.io.media.video import open_frames
+from jeat_graph.io.tables.detections_io import read_detections
 
 HEADER = b"t,sensor,left,top,width,height,score\n"
 #: A refusal takes no longer than that, whatever is claimed; a busy machine is slow.

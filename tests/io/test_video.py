@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.io.video import open_frames
-from jeat_graph.io.video_writer import FrameWriter
+from jeat_graph.io.media.video import open_frames
+from jeat_graph.io.media.video_writer import FrameWriter
 
 SIZE = (64, 48)
 RED = np.zeros((48, 64, 3), dtype=np.uint8) + np.array([250, 10, 20], dtype=np.uint8)

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.detections_io import read_detections, read_many
-from jeat_graph.io.formats import recognise
-from jeat_graph.io.trajectories_io import read_trajectories
-from jeat_graph.io.truth_io import read_truth
+from jeat_graph.io.tables.detections_io import read_detections, read_many
+from jeat_graph.io.tables.formats import recognise
+from jeat_graph.io.tables.trajectories_io import read_trajectories
+from jeat_graph.io.tables.truth_io import read_truth
 
 HZ = 20.0
 #: Two vehicles over three frames, as MOTChallenge text: frame, identity, box, score.

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from jeat_graph.io.decoders import quietly
+from jeat_graph.io.media.decoders import quietly
 
 _PARENTS = (b"moov", b"trak", b"mdia", b"minf", b"stbl")
 _TICKS_PER_S = 1000

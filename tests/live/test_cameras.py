@@ -13,9 +13,9 @@ import pytest
 from live_tests import brokers, video
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.capture.addresses import events_address, frames_address
 from jeat_graph.io.capture.camera import open_camera
 from jeat_graph.io.capture.event_camera import open_event_camera
+from jeat_graph.io.files.addresses import events_address, frames_address
 
 PATIENCE_S = 60.0
 QUICK = ["--detector-frames", "motion", "--mask", "none", "--detection-set", "frames.warm_up_s=0.5"]

@@ -146,8 +146,8 @@ def test_lines_of_a_terminal_are_given_out_as_they_are_typed_until_the_signal():
 
 def test_a_line_that_is_too_long_is_read_in_bounded_memory_from_a_pipe_too(monkeypatch):
     most = 1000
-    monkeypatch.setattr("jeat_graph.io.stream_text.LONGEST_LINE", most)
-    monkeypatch.setattr("jeat_graph.io.stream_text._REST", 64)
+    monkeypatch.setattr("jeat_graph.io.streams.stream_text.LONGEST_LINE", most)
+    monkeypatch.setattr("jeat_graph.io.streams.stream_text._REST", 64)
     with a_pipe() as (stream, write), Interrupts() as interrupts:
         os.write(write, b"a\n" + 30_000 * b"b" + b"\nc\n")
         lines = interrupts.lines(stream)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.tables.detections_io import read_detections
 
 
 @pytest.fixture(scope="module")

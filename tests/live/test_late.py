@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
-from jeat_graph.io.trajectories_io import write_trajectories
+from jeat_graph.io.tables.trajectories_io import write_trajectories
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.tracker import Tracker
 from jeat_graph_sehn.simulation.scenario import load_scenario

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.tables.reading import Reading
-from jeat_graph.io.packing import pack, unpack
-from jeat_graph.io.stream_reading import StreamReading
+from jeat_graph.io.files.packing import pack, unpack
+from jeat_graph.io.streams.stream_reading import StreamReading
 from jeat_graph.live.messages import Duplicates, ScanMessage, decode_scans, encode_tracks
 
 SCAN = {"t": 0.5, "sensor": "rgb", "boxes": [[1.0, 2.0, 3.0, 4.0]], "scores": [0.5]}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jeat_graph import Tracker
-from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.tables.detections_io import read_detections
 from jeat_graph.live.late import LiveTracker
 
 PAGE = Path(__file__).parents[2] / "docs" / "guides" / "batch.md"

@@ -12,7 +12,7 @@ import uuid
 import pytest
 from live_tests import brokers
 
-from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.tables.detections_io import read_detections
 from jeat_graph.live.transport.ends import open_sink, open_source
 
 COMMAND = [sys.executable, "-m", "jeat_graph.cli.main", "stream"]

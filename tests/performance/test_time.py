@@ -13,11 +13,11 @@ from benchmarks.speed_timing import summarise, time_side_by_side
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.metrics import evaluate
-from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events.evt3_writer import Evt3Writer
 from jeat_graph.io.events.opening import open_events
-from jeat_graph.io.tables import read_table
-from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.file_tables import read_table
+from jeat_graph.io.tables.trajectories_io import read_trajectories, write_trajectories
 from tests.performance.jobs import OneVehicle
 
 

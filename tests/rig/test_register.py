@@ -14,7 +14,7 @@ from jeat_graph import load_config, read_detections
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.picture_map import PictureMap
-from jeat_graph.io.detections_io import write_detections
+from jeat_graph.io.tables.detections_io import write_detections
 from jeat_graph.rig.clock_search import offset_of, rank_offsets
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.rig.homography import fit_homography

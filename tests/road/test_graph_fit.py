@@ -11,7 +11,7 @@ from road_scenes import camera
 from scipy.linalg import expm
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.tables import read_table
+from jeat_graph.io.tables.file_tables import read_table
 from jeat_graph.road.box_errors import BoxRows
 from jeat_graph.road.box_rows import BoxConfig, rows_of_table
 from jeat_graph.road.chain_rows import MOTION, LinearBoxes, chain_rows

@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 from jeat_graph import Tracker, load_config, read_detections
 from jeat_graph.cli.main import main
 from jeat_graph.filters.measurement import MEASUREMENT
-from jeat_graph.io.tables import read_table
+from jeat_graph.io.tables.file_tables import read_table
 from jeat_graph.road.camera_file import read_camera
 from jeat_graph.road.fixed_lag import RoadFixedLag, RoadLagConfig
 from jeat_graph.road.lag_table import RoadFile

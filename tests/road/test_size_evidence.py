@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from road_scenes import HEIGHT, WIDTH, camera
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.trajectories_io import COLUMNS
+from jeat_graph.io.tables.trajectories_io import COLUMNS
 from jeat_graph.road.camera_file import read_camera
 from jeat_graph.road.cuboid import sides
 from jeat_graph.road.evidence import CalibrationConfig, TrackNodes, thin

@@ -10,7 +10,7 @@ import pytest
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import DataError
 from jeat_graph.eval.load import load_run
-from jeat_graph.io.video_writer import FrameWriter
+from jeat_graph.io.media.video_writer import FrameWriter
 from jeat_graph.runs.beside import facts_beside, facts_of_frames, rate_of_truth, with_picture
 from jeat_graph.runs.track_files import TrackRequest
 

@@ -10,8 +10,8 @@ import pytest
 from jeat_graph import calibrate, compare, load_config, simulate, track
 from jeat_graph.cli.main import main
 from jeat_graph.data.detections import Detections
-from jeat_graph.io.detections_io import write_detections
-from jeat_graph.io.truth_io import write_truth
+from jeat_graph.io.tables.detections_io import write_detections
+from jeat_graph.io.tables.truth_io import write_truth
 from jeat_graph.runs.latency import at_measurement
 
 #: The recording's own sensors and picture, and times that are believed.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.trajectories_io import write_trajectories
+from jeat_graph.io.tables.trajectories_io import write_trajectories
 from jeat_graph.runs.recorded import load_run_data, rows_of_tracks
 
 from .tables import uniform_motion

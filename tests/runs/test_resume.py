@@ -13,7 +13,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.detections import Detections
-from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.tables.detections_io import read_detections
 from jeat_graph.runs import run_steps
 from jeat_graph.tracking.tracker import Tracker
 

@@ -11,7 +11,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.beside import lies_beside
+from jeat_graph.io.files.beside import lies_beside
 from jeat_graph.runs.directory import read_record
 
 SECRET = "marker-of-a-file-that-nobody-named 1 2 3\nsecond line\n"

@@ -11,7 +11,7 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.tables.trajectory_table import RUN_CLASSES
-from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
+from jeat_graph.io.tables.trajectories_io import read_trajectories, write_trajectories
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.classes import MOST_CLASSES
 from jeat_graph.tracking.tracker import Tracker

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from jeat_graph import Tracker, load_config
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.io.packing import pack, unpack
-from jeat_graph.io.state_file import read_state_file, write_state_file
+from jeat_graph.io.files.packing import pack, unpack
+from jeat_graph.io.files.state_file import read_state_file, write_state_file
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.checkpoint import _codecs, save_state
 from jeat_graph.tracking.model_tracker import ModelTracker

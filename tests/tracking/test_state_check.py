@@ -12,7 +12,7 @@ import pytest
 from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.io.state_file import digest, read_state_file
+from jeat_graph.io.files.state_file import digest, read_state_file
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.checkpoint import save_state
 from jeat_graph.tracking.tracker import Tracker

@@ -1,4 +1,4 @@
-// Rounds numbers to decimal digits, for jeat_graph/io/rounding.py.
+// Rounds numbers to decimal digits, for jeat_graph/io/tables/rounding.py.
 #pragma once
 
 #include <algorithm>

@@ -39,8 +39,8 @@ class Reading:
         time_unit: unit of the column `t` where it holds numbers: `s`, `ms`, `us` or `ns`.
         first_frame: number of a recording's first frame, 0 or 1; None for the rule of `data.frame_numbers`.
         video: name or number of the one that is read of a file's several videos.
-        class_names: names of classes that a file says by number (`io.class_names`): a list, a mapping, names
-            with commas between them, or a file.
+        class_names: names of classes that a file says by number (`io.tables.class_names`): a list, a mapping,
+            names with commas between them, or a file.
         image: width and height of the picture (px), for boxes in shares of it.
         score_scale: `unit` if scores are in [0, 1], `percent`, or `logistic` for raw scores of any size.
         fill_empty: whether frames without boxes are empty scans rather than no scans.
@@ -61,7 +61,7 @@ class Reading:
         """Return the names of classes by number, for a table that is no file; None where nobody says them.
 
         Raises:
-            DataError: they stand in a file, which is read elsewhere (`io.class_names`).
+            DataError: they stand in a file, which is read elsewhere (`io.tables.class_names`).
         """
         said = self.class_names
         if isinstance(said, str) and "," in said:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.detection.models.model_settings import ModelSettings
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 
 #: Grey level beside a picture that is smaller than the input, and white.
 _FILL, _WHITE = np.float32(114.0), np.float32(255.0)

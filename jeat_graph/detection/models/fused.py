@@ -21,7 +21,7 @@ from jeat_graph.detection.models.feeding import picture_input
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import OnnxHead, read_onnx_head
 from jeat_graph.detection.settings import BESIDE_RATE_HZ, EventSettings
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 
 PICTURE, GIVEN = "picture", "given"
 _US_PER_S = 1e6

@@ -14,7 +14,7 @@ from jeat_graph.detection.models.feeding import place, usual_feed
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 
 _SIZES = "int64"
 

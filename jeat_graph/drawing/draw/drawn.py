@@ -8,8 +8,8 @@ from typing import Any
 import yaml
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import open_atomic
-from jeat_graph.io.marks import LANES, LINES, MASKS, ZONES, polygon_of, read_marks_file
+from jeat_graph.io.files.atomic import open_atomic
+from jeat_graph.io.tables.marks import LANES, LINES, MASKS, ZONES, polygon_of, read_marks_file
 
 LENGTHS = "lengths"
 _COLUMNS = ("x1", "y1", "x2", "y2", "metres", "direction")
@@ -33,7 +33,7 @@ def as_page(marks: Path, lengths: Path) -> Page:
         for key, polygons in ((ZONES, known.zones), (MASKS, known.masks)):
             page[key] = [{"name": name, "points": list(map(list, one))} for name, one in polygons.items()]
     if lengths.is_file():
-        from jeat_graph.io.tables import read_table
+        from jeat_graph.io.tables.file_tables import read_table
 
         table = read_table(lengths, _COLUMNS)
         numbers = zip(*(table.number(name).tolist() for name in _COLUMNS[:-1]), strict=True)

@@ -12,8 +12,8 @@ from typing import Any
 
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.drawing.draw.drawn import Page, as_page, save_page
-from jeat_graph.io.pictures import as_png
-from jeat_graph.io.video import RgbImage
+from jeat_graph.io.media.pictures import as_png
+from jeat_graph.io.media.video import RgbImage
 
 _HOME = "127.0.0.1"
 _LARGEST = 1 << 20

@@ -10,7 +10,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.events import EventArray
 from jeat_graph.drawing.palette import BRIGHTER, DARK, DARKER
 from jeat_graph.io.events.stretches import Stretches
-from jeat_graph.io.video import FrameSource, RgbImage
+from jeat_graph.io.media.video import FrameSource, RgbImage
 
 # Events of one pixel at which its colour has come two thirds of the way (1 − 1/e).
 _SATURATION = 1.0

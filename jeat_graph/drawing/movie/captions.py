@@ -62,7 +62,7 @@ def read_speeds(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:
     Raises:
         DataError: it is none.
     """
-    from jeat_graph.io.tables import read_table
+    from jeat_graph.io.tables.file_tables import read_table
 
     table = read_table(path, ("t", "track_id", "speed_kmh"))
     speed = table.number("speed_kmh", blank_ok=True, nan_ok=True)

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.ffmpeg import FfmpegVideo, h264_encoder
-from jeat_graph.io.pictures import as_png, check_frames, finish_video, open_video
-from jeat_graph.io.piecewise import PiecewiseWriter
-from jeat_graph.io.video import RgbImage, quietly
+from jeat_graph.io.files.atomic import atomic_path
+from jeat_graph.io.files.piecewise import PiecewiseWriter
+from jeat_graph.io.media.ffmpeg import FfmpegVideo, h264_encoder
+from jeat_graph.io.media.pictures import as_png, check_frames, finish_video, open_video
+from jeat_graph.io.media.video import RgbImage, quietly
 
 CODECS = {".mp4": "vp09", ".webm": "VP80"}
 #: What a film in MP4 may be asked to be: H.264 where there is an encoder, H.264, or VP9.

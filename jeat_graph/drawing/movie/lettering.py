@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.drawing.palette import RIM, Rgb
-from jeat_graph.io.video import RgbImage
+from jeat_graph.io.media.video import RgbImage
 
 Alpha = npt.NDArray[np.float32]
 _KEPT_TEXTS = 4096

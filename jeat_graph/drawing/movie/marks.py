@@ -12,7 +12,7 @@ from jeat_graph.drawing.movie.lettering import Letters, Place, letters, paint, r
 from jeat_graph.drawing.movie.moments import Marks
 from jeat_graph.drawing.movie.totals import COUNTER_RGB, Counter
 from jeat_graph.drawing.palette import RIM, Rgb, track_rgb
-from jeat_graph.io.video import RgbImage
+from jeat_graph.io.media.video import RgbImage
 
 SIGMAS = 2.0
 #: Size of a track's number, of OpenCV's font in a picture 720 px high.

@@ -22,7 +22,7 @@ from jeat_graph.drawing.movie.marks import (
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt, back_in
 from jeat_graph.drawing.movie.totals import Counter
 from jeat_graph.drawing.palette import IGNORED_BOX, TEXT, TRUE_BOX
-from jeat_graph.io.video import RgbImage
+from jeat_graph.io.media.video import RgbImage
 
 _MARGIN_PX = 10.0
 

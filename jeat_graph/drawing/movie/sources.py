@@ -114,9 +114,9 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     """
     from jeat_graph.io.events.frame_clock import FrameClock, events_later_us
     from jeat_graph.io.events.stretches import open_stretches
-    from jeat_graph.io.scans_io import read_instants
-    from jeat_graph.io.truth_io import read_truth
-    from jeat_graph.io.video import open_frames
+    from jeat_graph.io.media.video import open_frames
+    from jeat_graph.io.tables.scans_io import read_instants
+    from jeat_graph.io.tables.truth_io import read_truth
 
     tables, request = _resolve(request)
     frames = events = clock = None
@@ -182,7 +182,7 @@ def _ways(request: Request) -> dict[str, Way]:
 def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:
     """Read the tracks; a segment without tracks stands for its own frames, events and truth."""
     from jeat_graph.eval.load import tables_of
-    from jeat_graph.io.trajectories_io import read_trajectories
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
 
     run = request.run
     if run is None:
@@ -212,7 +212,7 @@ def _resolve(request: Request) -> tuple[dict[str, Trajectories], Request]:
 
 
 def _has_frames(folder: Path) -> bool:
-    from jeat_graph.io.video import VIDEO_FILES
+    from jeat_graph.io.media.video import VIDEO_FILES
 
     return any((folder / name).exists() for name in VIDEO_FILES.values())
 

@@ -30,7 +30,7 @@ def save_pictures(
     """
     import matplotlib as mpl
 
-    from jeat_graph.io.atomic import atomic_path
+    from jeat_graph.io.files.atomic import atomic_path
 
     mpl.use("Agg")
     settings: Any = {"svg.hashsalt": "jeat-graph", "font.family": "DejaVu Sans"}

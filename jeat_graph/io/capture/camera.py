@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.capture.addresses import LiveAddress
 from jeat_graph.io.capture.reader import LiveReader, LostError
 from jeat_graph.io.capture.stream_clock import StreamClock
 from jeat_graph.io.capture.wall_clock import WallClock
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.files.addresses import LiveAddress
+from jeat_graph.io.media.decoders import RgbImage
 
 #: Longest wait for a connection, and for the next picture (s).
 CONNECT_S, PICTURE_S = 8.0, 5.0

@@ -11,10 +11,10 @@ import numpy as np
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.extras import install
-from jeat_graph.io.capture.addresses import LiveAddress
 from jeat_graph.io.capture.reader import LiveReader, LostError
 from jeat_graph.io.capture.stream_clock import StreamClock
 from jeat_graph.io.capture.wall_clock import WallClock
+from jeat_graph.io.files.addresses import LiveAddress
 
 _US_PER_S = 1e6
 #: Pieces that may wait, and pauses between looks for a new one (s).

@@ -19,7 +19,7 @@ from jeat_graph.io.events.layout import ROLES, EventLayout, roles_of_names
 from jeat_graph.io.events.npz_members import NpzMember
 from jeat_graph.io.events.reader import PIECE_ROWS
 from jeat_graph.io.events.tables import Block, EventTable
-from jeat_graph.io.limits import check_room
+from jeat_graph.io.files.limits import check_room
 
 _NUMBERS = "uifb"
 #: Records of CARLA's event camera, whose times are in ns.

@@ -28,9 +28,9 @@ def event_writer(path: Path, fmt: str | None, size_px: tuple[int, int], origin_u
         DataError: the suffix tells no format, or not this one.
     """
     from jeat_graph.io.events.dat_writer import DatWriter
+    from jeat_graph.io.events.dsec_writer import EventWriter
     from jeat_graph.io.events.evt2_writer import Evt2Writer
     from jeat_graph.io.events.evt3_writer import Evt3Writer
-    from jeat_graph.io.events_dsec_writer import EventWriter
 
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:

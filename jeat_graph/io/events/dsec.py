@@ -7,15 +7,15 @@ from pathlib import Path
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, agreed_size
-from jeat_graph.io.events_dsec import EventFile
 
 #: DSEC's own files do not say their size; its cameras have this one (px).
 DSEC_SIZE = (640, 480)
 
 
 class DsecReader(EventReader):
-    """Reads HDF5 in the layout of DSEC (`io.events_dsec`).
+    """Reads HDF5 in the layout of DSEC (`io.events.dsec_hdf5`).
 
     Args:
         path: the file.

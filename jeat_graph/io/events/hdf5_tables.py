@@ -16,11 +16,11 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.events.array_tables import ArrayItem, choose_stream, lying
+from jeat_graph.io.events.hdf5_chunks import read_chunks
+from jeat_graph.io.events.hdf5_items import check_storage, find_item, reading_error, single_item
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.reader import PIECE_ROWS
 from jeat_graph.io.events.tables import EventTable
-from jeat_graph.io.hdf5_chunks import read_chunks
-from jeat_graph.io.hdf5_items import check_storage, find_item, reading_error, single_item
 
 #: Names of an item with both sides of the picture. They stand in either order: a picture of a road is wider
 #: than it is high.

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.events.reader import PIECE_ROWS
-from jeat_graph.io.limits import check_room
+from jeat_graph.io.files.limits import check_room
 
 
 class NpzMember:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.capture.addresses import is_live
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.reader import EventReader
+from jeat_graph.io.files.addresses import is_live
 
 if TYPE_CHECKING:
     from jeat_graph.io.events.raw_header import RawHeader
@@ -189,10 +189,10 @@ def _open_hdf5(place: Path, size_px: tuple[int, int] | None, layout: EventLayout
     import h5py
 
     from jeat_graph.io.events.dsec import DsecReader
+    from jeat_graph.io.events.hdf5_items import find_item, opening_error
     from jeat_graph.io.events.hdf5_tables import hdf5_table
     from jeat_graph.io.events.prophesee_hdf5 import TABLE, PropheseeHdf5Reader
     from jeat_graph.io.events.tables import TableReader
-    from jeat_graph.io.hdf5_items import find_item, opening_error
 
     with suppress(ImportError):  # filters that some files need
         import hdf5plugin  # noqa: F401
@@ -218,7 +218,7 @@ def _open_hdf5(place: Path, size_px: tuple[int, int] | None, layout: EventLayout
 
 def _is_indexed(file: Any, place: Path) -> bool:
     """Whether HDF5 has the layout of DSEC with its index by time; times in s have no such index."""
-    from jeat_graph.io.hdf5_items import find_item
+    from jeat_graph.io.events.hdf5_items import find_item
 
     if find_item(file, "ms_to_idx", place) is None or find_item(file, "events", place) is None:
         return False

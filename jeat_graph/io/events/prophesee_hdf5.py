@@ -24,8 +24,8 @@ import numpy.typing as npt
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.ascending import Ascending
+from jeat_graph.io.events.hdf5_items import check_storage, find_item, missing_filters, reading_error
 from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers, agreed_size
-from jeat_graph.io.hdf5_items import check_storage, find_item, missing_filters, reading_error
 
 TABLE, EDGES = "CD/events", "EXT_TRIGGER/events"
 _ECF_FILTER = 36559

@@ -9,10 +9,10 @@ from typing import Protocol, Self
 
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.dsec import DSEC_SIZE, DsecReader, check_assumed
+from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.opening import open_events
 from jeat_graph.io.events.reader import Damage, EventReader
-from jeat_graph.io.events_dsec import EventFile
 
 
 class Stretches(Protocol):

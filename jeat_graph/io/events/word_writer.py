@@ -11,8 +11,8 @@ import numpy as np
 from jeat_graph.core import events as core
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.piecewise import PiecewiseWriter
+from jeat_graph.io.files.atomic import atomic_path
+from jeat_graph.io.files.piecewise import PiecewiseWriter
 
 _ROOM_WORDS = 1 << 18
 

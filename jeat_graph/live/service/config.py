@@ -17,8 +17,8 @@ from jeat_graph.config.yaml_lines import lines_of, with_line
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.secrets import shown_url
-from jeat_graph.io.capture.addresses import events_address, frames_address, is_live
-from jeat_graph.io.credentials import PASSWORD_FILE
+from jeat_graph.io.files.addresses import events_address, frames_address, is_live
+from jeat_graph.io.files.credentials import PASSWORD_FILE
 from jeat_graph.live.transport.ends import check_addresses
 
 STDOUT = "-"

@@ -12,7 +12,7 @@ from typing import TypeVar
 from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.capture.back_off import BackOff
-from jeat_graph.io.track_lines import json_line
+from jeat_graph.io.streams.track_lines import json_line
 from jeat_graph.live.health import HealthChange
 from jeat_graph.live.messages import ScanMessage, encode_tracks
 from jeat_graph.live.service.config import STDOUT, ServiceConfig, full_url

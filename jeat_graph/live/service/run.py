@@ -13,9 +13,9 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.locking import hold_file
-from jeat_graph.io.scan_batch import ScanBatch
-from jeat_graph.io.stream_reading import StreamReading
+from jeat_graph.io.files.locking import hold_file
+from jeat_graph.io.streams.scan_batch import ScanBatch
+from jeat_graph.io.streams.stream_reading import StreamReading
 from jeat_graph.live.interrupts import Interrupts
 from jeat_graph.live.late import LiveTracker, check_saved
 from jeat_graph.live.messages import ScanMessage, decode_scans

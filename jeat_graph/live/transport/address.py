@@ -11,7 +11,7 @@ from urllib.parse import SplitResult, parse_qsl, unquote, urlsplit
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.secrets import Secret, shown_url
-from jeat_graph.io.credentials import PASSWORD_FILE, login_text, password_from
+from jeat_graph.io.files.credentials import PASSWORD_FILE, login_text, password_from
 from jeat_graph.live.transport import tls
 from jeat_graph.live.transport.tls import Tls
 from jeat_graph.live.transport.topics import wrong_name, wrong_topic

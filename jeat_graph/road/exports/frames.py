@@ -11,7 +11,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.steps import check_steps
-from jeat_graph.io.tables import read_table
+from jeat_graph.io.tables.file_tables import read_table
 
 _TABLES = ("road.csv", "road_smoothed.csv", "road_causal.csv")
 _MOTION = ("x", "y", "speed_kmh", "heading_deg", "acceleration")

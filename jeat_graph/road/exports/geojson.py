@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import open_atomic
+from jeat_graph.io.files.atomic import open_atomic
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.exports.frames import RoadFrames
 from jeat_graph.road.exports.utm import to_wgs84

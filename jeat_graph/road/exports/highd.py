@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.io.rounding import round_decimals
-from jeat_graph.io.table_writer import write_columns
+from jeat_graph.io.tables.rounding import round_decimals
+from jeat_graph.io.tables.table_writer import write_columns
 from jeat_graph.road.exports.frames import RoadFrames
 
 _AROUND = (

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from jeat_graph.io.atomic import open_atomic
+from jeat_graph.io.files.atomic import open_atomic
 from jeat_graph.road.camera import Georeference
 from jeat_graph.road.exports.frames import RoadFrames
 

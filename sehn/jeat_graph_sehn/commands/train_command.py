@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("training needs PyTorch: pip install './sehn[train]' in a checkout") from None
     from tqdm import tqdm
 
-    from jeat_graph.io.atomic import check_writable
+    from jeat_graph.io.files.atomic import check_writable
     from jeat_graph_sehn.training.procedure import train
 
     request = _request(args)

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.detection.models.feeding import letterbox_scale
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Picture
 from jeat_graph_sehn.training.event_samples import Sequence, draw_sequence
 from jeat_graph_sehn.training.fused_network import TOLD, SeenPictures

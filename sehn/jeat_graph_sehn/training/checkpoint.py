@@ -9,7 +9,7 @@ from typing import Any
 import torch
 
 from jeat_graph.data.errors import DataError, OtherRunError
-from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.files.atomic import atomic_path
 
 _IDENTITY = "identity"
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 
 #: Smallest and largest shape (px), as often in each octave between.
 _LEAST_PX, _MOST_PX = 4.0, 160.0

@@ -10,9 +10,9 @@ import numpy as np
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.detection.models.class_names import wanted_classes
-from jeat_graph.io.decoders import RgbImage
-from jeat_graph.io.limits import check_file
-from jeat_graph.io.picture_file import read_picture
+from jeat_graph.io.files.limits import check_file
+from jeat_graph.io.media.decoders import RgbImage
+from jeat_graph.io.media.picture_file import read_picture
 from jeat_graph_sehn.training.data_sets import Picture
 from jeat_graph_sehn.training.truth_at import TrueBoxes
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.decoders import RgbImage
-from jeat_graph.io.truth_io import read_truth
-from jeat_graph.io.video import VIDEO_FILES, open_frames
+from jeat_graph.io.media.decoders import RgbImage
+from jeat_graph.io.media.video import VIDEO_FILES, open_frames
+from jeat_graph.io.tables.truth_io import read_truth
 from jeat_graph_sehn.training.far_truth import asking_for_far
 from jeat_graph_sehn.training.truth_at import TrueBoxes, TruthByTime
 

@@ -13,7 +13,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.detection.models.event_places import event_scale
 from jeat_graph.detection.windows import EventBins
-from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph_sehn.training.data_sets import EventSegment
 from jeat_graph_sehn.training.picture_samples import CutOut, draw_window
 from jeat_graph_sehn.training.settings import NetSettings, TrainSettings

@@ -20,7 +20,7 @@ import torch
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.models.onnx_head import CARD
-from jeat_graph.io.atomic import atomic_path
+from jeat_graph.io.files.atomic import atomic_path
 from jeat_graph_sehn.training.making import SECOND_LOOK
 from jeat_graph_sehn.training.network import VehicleNet
 from jeat_graph_sehn.training.serving import ServedNet

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.detection.models.event_places import event_scale
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph_sehn.training.data_sets import FusedSegment
 from jeat_graph_sehn.training.event_samples import Sequence, asked_for, cut_sequence, drawn_events
 from jeat_graph_sehn.training.fused_network import TOLD

@@ -17,7 +17,7 @@ from jeat_graph.detection.models.feeding import picture_input, place, usual_feed
 from jeat_graph.detection.models.layouts import decode
 from jeat_graph.detection.models.model_settings import OWN_OVERLAPS, ModelSettings
 from jeat_graph.eval.detection_ap import average_precision, match_greedily
-from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Picture
 from jeat_graph_sehn.training.event_samples import asked_for, windows_of
 from jeat_graph_sehn.training.fused_network import FusedNet

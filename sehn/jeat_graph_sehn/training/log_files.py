@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.table_writer import write_columns
+from jeat_graph.io.files.atomic import atomic_path
+from jeat_graph.io.tables.table_writer import write_columns
 from jeat_graph_sehn.training.trainer import LogRow
 
 _SIZE_IN = (8.0, 4.0)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
-from jeat_graph.io.decoders import RgbImage
+from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph_sehn.training.clutter import draw_clutter
 from jeat_graph_sehn.training.settings import PictureChanges
 from jeat_graph_sehn.training.truth_at import TrueBoxes

@@ -15,7 +15,7 @@ import yaml
 
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.files.hashing import sha256_of
 from jeat_graph.version import __version__
 from jeat_graph_sehn.training.coco_pictures import read_coco_pictures
 from jeat_graph_sehn.training.data_sets import (
@@ -235,7 +235,7 @@ def _side(member: Picture | EventSegment) -> tuple[int, int]:
     if isinstance(member, Picture):
         height, width = member.load().shape[:2]
         return padded((width, height))
-    from jeat_graph.io.events_dsec import EventFile
+    from jeat_graph.io.events.dsec_hdf5 import EventFile
 
     with EventFile(member.path) as file:
         if file.size_px is None:

@@ -22,8 +22,8 @@ from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.feeding import place, usual_feed
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, read_onnx_head
-from jeat_graph.io.atomic import atomic_path
-from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events.dsec_hdf5 import EventFile
+from jeat_graph.io.files.atomic import atomic_path
 from jeat_graph_sehn.training.data_sets import EventSegment, Picture
 from jeat_graph_sehn.training.event_samples import windows_of
 from jeat_graph_sehn.training.export import halve_weights, share_weights

@@ -12,8 +12,8 @@ from jeat_graph.cli.main import main
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.truth_io import read_truth
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.truth_io import read_truth
 from jeat_graph_sehn.simulation.scenario import load_scenario, scenario_names
 from jeat_graph_sehn.simulation.simulate import record, simulate
 from jeat_graph_sehn.simulation.world.truth import look

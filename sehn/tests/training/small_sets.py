@@ -6,8 +6,8 @@ import numpy as np
 
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.events_dsec_writer import EventWriter
-from jeat_graph.io.truth_io import write_truth
+from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.tables.truth_io import write_truth
 
 SIZE = (64, 48)
 FRAMES = 12

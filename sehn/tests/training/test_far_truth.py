@@ -77,7 +77,7 @@ def test_what_does_not_fit_is_refused(tmp_path, text, words):
 
 @pytest.mark.usefixtures("no_plot")
 def test_what_is_judged_stays_as_the_truth_has_it(tmp_path):
-    from jeat_graph.io.truth_io import read_truth, write_truth
+    from jeat_graph.io.tables.truth_io import read_truth, write_truth
 
     root = tmp_path / "set"
     for segment in range(2):

@@ -66,7 +66,7 @@ def test_a_table_is_read_and_written_without_pandas(tmp_path):
     (tmp_path / "boxes.csv").write_text("t,sensor,left,top,width,height,score\n0,rgb,1,2,30,40,0.5\n\n")
     program = f"""
 import sys
-from jeat_graph.io.detections_io import read_detections, write_detections
+from jeat_graph.io.tables.detections_io import read_detections, write_detections
 boxes = read_detections({str(tmp_path / "boxes.csv")!r})
 write_detections(boxes, {str(tmp_path / "again.csv")!r})
 assert len(boxes) == 1, boxes

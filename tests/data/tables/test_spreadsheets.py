@@ -13,8 +13,8 @@ from jeat_graph.cli.main import main
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.tables.spreadsheets import guarded, unguarded
 from jeat_graph.eval.tables import Table
-from jeat_graph.io.detections_io import read_detections, write_detections
-from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.io.tables.detections_io import read_detections, write_detections
+from jeat_graph.io.tables.trajectories_io import read_trajectories
 
 FORMULAS = ['=HYPERLINK("http://x.example","y")', "+cmd|' /C calc'!A0", "-2+3", "@SUM(1)", "＝1+1", "'=1+1"]
 PLAIN = ["car", "-1", "+5", "-1e-3", "a=b", "x-y", "'", "''", "'a", "", "é"]

@@ -16,8 +16,8 @@ from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import read_onnx_head
 from jeat_graph.detection.models.pictures import ModelPictureDetector
 from jeat_graph.detection.settings import EventSettings
-from jeat_graph.io.detections_io import read_detections
 from jeat_graph.io.events.evt3_writer import Evt3Writer
+from jeat_graph.io.tables.detections_io import read_detections
 
 from ..moving import events_of
 

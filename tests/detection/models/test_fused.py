@@ -15,8 +15,8 @@ from jeat_graph.detection.models.events import ModelEventDetector
 from jeat_graph.detection.models.fused import FusedDetector
 from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import EventSettings
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.events_dsec_writer import EventWriter
+from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.tables.detections_io import read_detections
 
 pytest.importorskip("onnx", reason="pip install onnx")
 

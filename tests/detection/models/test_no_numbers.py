@@ -11,7 +11,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.detection.models.layouts import LAYOUT_NAMES, decode
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.pictures import ModelPictureDetector
-from jeat_graph.io.detections_io import read_detections
+from jeat_graph.io.tables.detections_io import read_detections
 
 pytest.importorskip("onnx", reason="pip install onnx")
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.drawing.draw.server import DrawServer
-from jeat_graph.io.marks import read_marks_file
+from jeat_graph.io.tables.marks import read_marks_file
 from jeat_graph.road.inputs import read_lengths
 
 DRIVER = shutil.which("chromedriver")

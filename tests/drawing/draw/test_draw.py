@@ -19,7 +19,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.drawing.draw.drawn import as_page, save_page
 from jeat_graph.drawing.draw.server import DrawServer
 from jeat_graph.drawing.grid import grid_step, with_grid
-from jeat_graph.io.marks import read_marks_file
+from jeat_graph.io.tables.marks import read_marks_file
 from jeat_graph.road.inputs import read_lengths
 
 PAGE = {
@@ -183,7 +183,7 @@ def test_the_command_serves_a_video_until_the_page_is_done(tmp_path, capsys, mon
 
 
 def test_the_tracks_of_a_run_are_shown(tmp_path, monkeypatch):
-    from jeat_graph.io.trajectories_io import write_trajectories
+    from jeat_graph.io.tables.trajectories_io import write_trajectories
 
     from ..movie.conftest import vehicle
 

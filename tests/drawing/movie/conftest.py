@@ -9,10 +9,10 @@ import pytest
 from jeat_graph.cli.main import main
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.io.events_dsec_writer import EventWriter
-from jeat_graph.io.trajectories_io import write_trajectories
-from jeat_graph.io.truth_io import write_truth
-from jeat_graph.io.video_writer import FrameWriter
+from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.media.video_writer import FrameWriter
+from jeat_graph.io.tables.trajectories_io import write_trajectories
+from jeat_graph.io.tables.truth_io import write_truth
 
 WIDTH, HEIGHT = 160, 96
 

@@ -17,8 +17,8 @@ from jeat_graph.drawing.movie.film import H264, VP9, MovieWriter
 from jeat_graph.drawing.movie.totals import COUNTER_RGB, Counter
 from jeat_graph.eval.counting import Line
 from jeat_graph.eval.zones import Zone
-from jeat_graph.io import ffmpeg
-from jeat_graph.io.trajectories_io import write_trajectories
+from jeat_graph.io.media import ffmpeg
+from jeat_graph.io.tables.trajectories_io import write_trajectories
 
 from .conftest import HEIGHT, WIDTH, read_movie, vehicle
 

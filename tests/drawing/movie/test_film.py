@@ -16,8 +16,8 @@ import pytest
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.drawing.movie.film import CODECS, MovieWriter
-from jeat_graph.io.trajectories_io import write_trajectories
-from jeat_graph.io.video import count_frames
+from jeat_graph.io.media.video import count_frames
+from jeat_graph.io.tables.trajectories_io import write_trajectories
 
 from .conftest import HEIGHT, WIDTH, read_movie, vehicle
 

@@ -18,8 +18,8 @@ from jeat_graph.drawing.movie.backgrounds import accumulate
 from jeat_graph.drawing.movie.marks import Canvas, dashes
 from jeat_graph.drawing.movie.moments import TracksAt, TruthAt
 from jeat_graph.drawing.palette import BRIGHTER, DARK, DARKER, track_rgb
-from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
-from jeat_graph.io.truth_io import write_truth
+from jeat_graph.io.tables.trajectories_io import read_trajectories, write_trajectories
+from jeat_graph.io.tables.truth_io import write_truth
 
 from .conftest import HEIGHT, WIDTH, grey_frame, read_movie, truth_of, vehicle
 

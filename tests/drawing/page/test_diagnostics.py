@@ -13,9 +13,9 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.io.detections_io import write_detections
-from jeat_graph.io.diagnostics_io import COLUMNS, DiagnosticsWriter, read_diagnostics
-from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.io.tables.detections_io import write_detections
+from jeat_graph.io.tables.diagnostics_io import COLUMNS, DiagnosticsWriter, read_diagnostics
+from jeat_graph.io.tables.trajectories_io import read_trajectories
 from jeat_graph_sehn.simulation.scenario import load_scenario
 from jeat_graph_sehn.simulation.simulate import record
 

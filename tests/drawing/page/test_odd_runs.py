@@ -10,7 +10,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.trajectories_io import read_trajectories, write_trajectories
+from jeat_graph.io.tables.trajectories_io import read_trajectories, write_trajectories
 
 
 def test_a_run_without_diagnostics_says_which_option_makes_them(copy_of, report):

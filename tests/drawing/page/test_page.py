@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.diagnostics_io import read_diagnostics
-from jeat_graph.io.trajectories_io import read_trajectories
+from jeat_graph.io.tables.diagnostics_io import read_diagnostics
+from jeat_graph.io.tables.trajectories_io import read_trajectories
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.opening import open_events
-from jeat_graph.io.video import open_frames
+from jeat_graph.io.media.video import open_frames
 
 pytest.importorskip("aedat", reason="pip install 'aedat>=2.2,<3'")
 

@@ -11,8 +11,8 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+from jeat_graph.io.events.dsec_writer import EventWriter
 from jeat_graph.io.events.opening import open_events
-from jeat_graph.io.events_dsec_writer import EventWriter
 
 from .plain import HEADERS, HEIGHT, RANDOM, READ, WIDTH
 from .test_decoders import read, rows

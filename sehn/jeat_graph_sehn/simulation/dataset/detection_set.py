@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import yaml
 
-from jeat_graph.io.atomic import open_atomic
-from jeat_graph.io.detections_io import write_detections
-from jeat_graph.io.hashing import sha256_of
-from jeat_graph.io.locking import hold_folder
-from jeat_graph.io.rounding import round_decimals
-from jeat_graph.io.table_writer import write_columns
-from jeat_graph.io.truth_io import write_truth
+from jeat_graph.io.files.atomic import open_atomic
+from jeat_graph.io.files.hashing import sha256_of
+from jeat_graph.io.files.locking import hold_folder
+from jeat_graph.io.tables.detections_io import write_detections
+from jeat_graph.io.tables.rounding import round_decimals
+from jeat_graph.io.tables.table_writer import write_columns
+from jeat_graph.io.tables.truth_io import write_truth
 from jeat_graph.version import __version__
 from jeat_graph_sehn.simulation.dataset.layout import (
     CAMERA,

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import open_atomic
-from jeat_graph.io.coco_writer import coco_categories, merge_coco
-from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.exports.coco_writer import coco_categories, merge_coco
+from jeat_graph.io.files.atomic import open_atomic
+from jeat_graph.io.files.hashing import sha256_of
 from jeat_graph.version import __version__
 from jeat_graph_sehn.simulation.dataset.layout import (
     ANNOTATIONS,

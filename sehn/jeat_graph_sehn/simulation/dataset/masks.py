@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.pictures import as_png
+from jeat_graph.io.media.pictures import as_png
 from jeat_graph_sehn.simulation.dataset.layout import MASKS
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.io.events_dsec_writer import compression_filter
-from jeat_graph.io.video import VIDEO_FILES
+from jeat_graph.io.events.dsec_writer import compression_filter
+from jeat_graph.io.media.video import VIDEO_FILES
 
 SPLITS = ("train", "val", "test")
 FRAMES_PER_SEGMENT = 100  # as in the full set of 500 segments (paper, "Dataset setup")

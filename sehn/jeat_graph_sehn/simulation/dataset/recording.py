@@ -12,9 +12,9 @@ import yaml
 
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.io.atomic import open_atomic
-from jeat_graph.io.locking import hold_folder
-from jeat_graph.io.outputs import check_folder
+from jeat_graph.io.files.atomic import open_atomic
+from jeat_graph.io.files.locking import hold_folder
+from jeat_graph.io.files.outputs import check_folder
 from jeat_graph.version import __version__
 from jeat_graph_sehn.simulation.dataset.disk import check_room, segment_bound
 from jeat_graph_sehn.simulation.dataset.layout import (

@@ -14,10 +14,10 @@ import numpy as np
 import yaml
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.atomic import open_atomic
-from jeat_graph.io.events_dsec_writer import EventWriter
-from jeat_graph.io.hashing import sha256_of
-from jeat_graph.io.video_writer import FrameWriter
+from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.files.atomic import open_atomic
+from jeat_graph.io.files.hashing import sha256_of
+from jeat_graph.io.media.video_writer import FrameWriter
 from jeat_graph_sehn.simulation.dataset.disk import FULL, check_disk, disk_is_full
 from jeat_graph_sehn.simulation.dataset.layout import (
     CAMERA,

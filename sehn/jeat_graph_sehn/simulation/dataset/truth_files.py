@@ -10,12 +10,12 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.coco_writer import coco_annotations, coco_categories, coco_images, write_coco
-from jeat_graph.io.prophesee_writer import write_array
-from jeat_graph.io.rounding import round_decimals
-from jeat_graph.io.table_writer import write_columns
-from jeat_graph.io.truth_io import write_truth
-from jeat_graph.io.video import VIDEO_FILES
+from jeat_graph.io.exports.coco_writer import coco_annotations, coco_categories, coco_images, write_coco
+from jeat_graph.io.exports.prophesee_writer import write_array
+from jeat_graph.io.media.video import VIDEO_FILES
+from jeat_graph.io.tables.rounding import round_decimals
+from jeat_graph.io.tables.table_writer import write_columns
+from jeat_graph.io.tables.truth_io import write_truth
 from jeat_graph_sehn.simulation.dataset.layout import BOXES, COCO, SEGMENTS, TRUTH, VEHICLES, segment_name
 from jeat_graph_sehn.simulation.segment import FrameTruth
 from jeat_graph_sehn.simulation.world.vehicles import KIND_NAMES

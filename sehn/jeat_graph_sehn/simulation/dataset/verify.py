@@ -11,11 +11,11 @@ import numpy as np
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.io.detections_io import read_detections
-from jeat_graph.io.events_dsec import EventFile
-from jeat_graph.io.hashing import sha256_of
-from jeat_graph.io.truth_io import read_truth
-from jeat_graph.io.video import FRAME_TIMES, VIDEO_FILES, open_frames, read_frame_times
+from jeat_graph.io.events.dsec_hdf5 import EventFile
+from jeat_graph.io.files.hashing import sha256_of
+from jeat_graph.io.media.video import FRAME_TIMES, VIDEO_FILES, open_frames, read_frame_times
+from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.truth_io import read_truth
 from jeat_graph_sehn.simulation.dataset.layout import (
     BOXES,
     CAMERA,

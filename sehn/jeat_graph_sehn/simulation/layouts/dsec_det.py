@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.video import open_frames
+from jeat_graph.io.media.video import open_frames
 from jeat_graph_sehn.simulation.layouts.sets import SetSegment
 from jeat_graph_sehn.simulation.world.vehicles import KIND_NAMES
 

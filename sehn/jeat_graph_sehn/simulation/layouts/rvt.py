@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph_sehn.simulation.layouts.histograms import BINS, halved, stacked_histogram
 from jeat_graph_sehn.simulation.layouts.rvt_labels import LARGE, rvt_boxes
 from jeat_graph_sehn.simulation.layouts.sets import SetSegment

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.io.prophesee_writer import BOX_DTYPE
+from jeat_graph.io.exports.prophesee_writer import BOX_DTYPE
 from jeat_graph_sehn.simulation.layouts.sets import two_wheels
 
 LARGE, SMALL = (1280, 720), (304, 240)  # px, of Prophesee's 1 Mpx and Gen1 automotive data sets

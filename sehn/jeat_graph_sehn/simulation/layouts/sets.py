@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.events_dsec import EventFile
-from jeat_graph.io.prophesee_writer import BOX_DTYPE
-from jeat_graph.io.video import FRAME_TIMES, read_frame_times
+from jeat_graph.io.events.dsec_hdf5 import EventFile
+from jeat_graph.io.exports.prophesee_writer import BOX_DTYPE
+from jeat_graph.io.media.video import FRAME_TIMES, read_frame_times
 from jeat_graph_sehn.simulation.dataset.layout import BOXES, EVENTS, MANIFEST, SEGMENTS
 from jeat_graph_sehn.simulation.dataset.manifest import read_json
 from jeat_graph_sehn.simulation.dataset.protocol import SPLITS

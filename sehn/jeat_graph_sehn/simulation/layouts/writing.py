@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.io.atomic import naming
+from jeat_graph.io.files.atomic import naming
 from jeat_graph_sehn.simulation.layouts.dsec_det import write_dsec_det, write_split
 from jeat_graph_sehn.simulation.layouts.rvt import write_rvt
 from jeat_graph_sehn.simulation.layouts.rvt_input import write_rvt_input

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.events_dsec import EventFile
-from jeat_graph.io.video import open_frames
+from jeat_graph.io.events.dsec_hdf5 import EventFile
+from jeat_graph.io.media.video import open_frames
 from jeat_graph_sehn.simulation import compiling
 from jeat_graph_sehn.simulation.dataset.manifest import read_json
 from jeat_graph_sehn.simulation.scenario import load_scenario

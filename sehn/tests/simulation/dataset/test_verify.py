@@ -12,7 +12,7 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.hashing import sha256_of
+from jeat_graph.io.files.hashing import sha256_of
 from jeat_graph_sehn.simulation.dataset.verify import verify
 
 SEGMENT = "segments/000001"

@@ -16,7 +16,7 @@ import pytest
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.opening import open_events
-from jeat_graph.io.video import open_frames
+from jeat_graph.io.media.video import open_frames
 from jeat_graph_sehn.simulation.imaging.config import load_imaging
 from jeat_graph_sehn.simulation.imaging.contrast import tight_boxes
 from jeat_graph_sehn.simulation.imaging.event_camera import EventCamera

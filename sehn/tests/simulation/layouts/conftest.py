@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.events_dsec_writer import EventWriter
-from jeat_graph.io.prophesee_writer import write_array
+from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.exports.prophesee_writer import write_array
 from jeat_graph_sehn.simulation.dataset.protocol import Protocol
 from jeat_graph_sehn.simulation.dataset.recording import record_dataset
 from jeat_graph_sehn.simulation.layouts.sets import SetSegment

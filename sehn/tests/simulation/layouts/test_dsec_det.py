@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from jeat_graph.cli.main import main
-from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph_sehn.simulation.layouts.sets import open_set
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
-from jeat_graph.io.events_dsec import EventFile
+from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph_sehn.simulation.layouts.histograms import halved, stacked_histogram
 from jeat_graph_sehn.simulation.layouts.rvt import windows_for, write_rvt
 from jeat_graph_sehn.simulation.layouts.rvt_input import write_rvt_input

@@ -1,0 +1,1 @@
+"""Pictures and videos, and when each picture was taken."""

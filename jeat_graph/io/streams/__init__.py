@@ -1,0 +1,1 @@
+"""Scans and tracks as lines of a stream."""

@@ -1,0 +1,1 @@
+"""Tables of boxes, tracks and truth: one file a format."""

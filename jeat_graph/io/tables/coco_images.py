@@ -1,0 +1,113 @@
+"""The list of images of a COCO data set: when each was taken, and of which video it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import first_frame
+from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.data.tables.reading import Reading
+from jeat_graph.data.videos import choose_video
+from jeat_graph.io.tables.coco_entries import finite_number
+
+
+class Images(NamedTuple):
+    """The images of one video.
+
+    Attributes:
+        time: when each was taken (s), by its id.
+        known: ids of the images of all videos.
+        by_name: id of each image by its file name and by that without folder and type.
+        first: number of the first image, or None where images have times of their own.
+    """
+
+    time: dict[int, float]
+    known: set[int]
+    by_name: dict[str, int]
+    first: int | None
+
+
+def read_images(tree: Mapping[str, Any], how: Reading, path: str | Path) -> Images | None:
+    """Read the list of images; None where there is none.
+
+    Args:
+        tree: the data set.
+        how: rate and first frame, needed where images have no `timestamp`; and the video.
+        path: the file, for messages.
+
+    Raises:
+        DataError: an image that is not as it should be; or several videos and none chosen.
+    """
+    images = tree.get("images")
+    if images is None:
+        return None
+    if not isinstance(images, list):
+        raise DataError("`images` must be a list", path)
+    for k, image in enumerate(images):
+        number = image.get("id") if isinstance(image, dict) else None
+        if isinstance(number, bool) or not isinstance(number, int):
+            raise DataError(f"image {k + 1}: must be an object with a whole number as `id`", path)
+    known = {image["id"] for image in images}
+    by_name: dict[str, int] = {}
+    for image in images:
+        name = str(image.get("file_name", ""))
+        by_name.setdefault(Path(name).stem, image["id"])
+        by_name[name] = image["id"]
+    own = _of_one_video(images, tree, how, path)
+    time, first = _times(own, how, path)
+    return Images(time, known, by_name, first)
+
+
+def _of_one_video(
+    images: list[dict[str, Any]], tree: Mapping[str, Any], how: Reading, path: str | Path
+) -> list[tuple[int, dict[str, Any]]]:
+    """The images of the chosen video, each with its place in the list."""
+    labels = [image.get("video_id", image.get("video")) for image in images]
+    videos = tree.get("videos")
+    names = {
+        video["id"]: str(video.get("name", video.get("file_name", "")))
+        for video in (videos if isinstance(videos, list) else [])
+        if isinstance(video, dict) and isinstance(video.get("id"), int | str)
+    }
+
+    def spoken(label: Any) -> str:
+        name = names.get(label, "") if isinstance(label, int | str) else ""
+        return f"{label} ({name})" if name and name != str(label) else str(label)
+
+    distinct = sorted({spoken(label) for label in labels if label is not None})
+    chosen = choose_video(distinct, how.video, path)
+    return [
+        (k, image)
+        for k, (image, label) in enumerate(zip(images, labels, strict=True))
+        if chosen is None or label is None or spoken(label) == chosen
+    ]
+
+
+def _times(
+    images: list[tuple[int, dict[str, Any]]], how: Reading, path: str | Path
+) -> tuple[dict[int, float], int | None]:
+    """Time (s) of each image by its id, and the number of the first where they count."""
+    stamped: dict[int, float] = {}
+    counted: dict[int, float] = {}
+    for k, image in images:
+        try:
+            if "timestamp" in image:
+                stamped[image["id"]] = finite_number(image["timestamp"])
+            else:
+                counted[image["id"]] = finite_number(image.get("frame_id", image["id"]))
+        except (TypeError, ValueError, OverflowError):
+            raise DataError(f"image {k + 1}: timestamp and frame_id must be finite numbers", path) from None
+        if how.rate_hz is None and "timestamp" not in image:
+            raise DataError(
+                f"image {k + 1} has no `timestamp`; give the frame rate (--rate, in Python rate_hz)", path
+            )
+    if not counted:
+        return stamped, None
+    first = first_frame(np.array(list(counted.values())), how.first_frame)
+    rate = check_rate(how.rate_hz or 0.0, path)
+    return stamped | {number: (frame - first) / rate for number, frame in counted.items()}, first

@@ -1,0 +1,217 @@
+"""Detections from and to files, whatever the format."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM
+from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR, NUMBER_COLUMNS
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.notes import note
+from jeat_graph.data.tables.detection_table import OPTIONAL, rows_of_detections
+from jeat_graph.data.tables.file_table import FileTable
+from jeat_graph.data.tables.frame_filling import scale_scores
+from jeat_graph.data.tables.reading import Reading, ReadingOptions
+from jeat_graph.io.tables.box_rows import read_rows
+from jeat_graph.io.tables.class_names import names_by_number
+from jeat_graph.io.tables.csv_text import NUMBER, WORD
+from jeat_graph.io.tables.detection_rows import assemble
+from jeat_graph.io.tables.file_tables import read_table
+from jeat_graph.io.tables.formats import counts_frames, known_columns, recognise
+from jeat_graph.io.tables.rounding import round_decimals
+from jeat_graph.io.tables.table_writer import write_columns
+
+_COLUMNS = ("t", "sensor", *BOX, "score")
+_KINDS = {
+    **dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER),
+    **dict.fromkeys(("sensor", *ASIDE), WORD),
+}
+_TABLES = ("csv", "parquet")
+
+
+def read_detections(
+    path: str | Path,
+    *,
+    sensor: str | None = None,
+    fmt: str | None = None,
+    **options: Unpack[ReadingOptions],
+) -> Detections:
+    """Read detections from a file of any known format.
+
+    ============  ==========================================================================================
+    csv, parquet  `t, sensor, left, top, width, height[, score, class]`, rows in any order; a row with only
+                  `t` and `sensor` is an empty scan. Usual other names are understood, see `column_names`;
+                  other columns are passed over. `;` or tabs between fields, `.csv.gz`. A table that counts
+                  frames may lack `sensor`.
+    motchallenge  `frame, id, left, top, width, height, conf, …`; rate from `rate_hz` or `seqinfo.ini`. Also
+                  in a zip that CVAT takes or gives (`MOT 1.1`).
+    kitti         tracking labels (17 columns) or results (18), frames from 0; 10 Hz unless `rate_hz` says so.
+    prophesee     structured `.npy` with `t` or `ts` (µs), `x, y, w, h`, `class_confidence` or `confidence`.
+    coco          results or data set, JSON; times from `images`, else image_id by `rate_hz`.
+    yolo          folder of labels, one file a picture; needs `image` and `rate_hz`.
+    ============  ==========================================================================================
+
+    A file without scores gives every box the score 1. Only tables can say that a scan found nothing. For the
+    others, with `fill_empty`, frames between the first and the last that have no box become empty scans (to
+    the length in `seqinfo.ini`, if there is one; by `rate_hz` for `prophesee`, and only if it is given; all
+    listed images for `coco`); so do those of a table that counts frames and has neither `sensor` nor empty
+    scans.
+
+    Args:
+        path: the file.
+        sensor: the sensor's name where the format has none (default `rgb`); renames the one sensor of a CSV
+            or Parquet file, or names it if the file has no such column.
+        fmt: the format, if it should not be recognised from the file.
+        options: what the file does not say itself, as `tables.reading.Reading` has it: `rate_hz`,
+            `time_unit`, `first_frame`, `video`, `class_names`, `image`, `score_scale`, `fill_empty`,
+            `images`.
+
+    Raises:
+        DataError: names the file, the line or row, and what is wrong.
+    """
+    return _read_counted(path, sensor, fmt, Reading(**options))[0]
+
+
+def _read_counted(
+    path: str | Path, sensor: str | None, fmt: str | None, how: Reading
+) -> tuple[Detections, int | None]:
+    """Read detections, and tell the first frame's number where the file leaves it open."""
+    kind = recognise(path, fmt)
+    if kind in _TABLES:
+        return _read_contract(path, sensor, how)
+    name = DEFAULT_SENSOR if sensor is None else sensor
+    rows = read_rows(path, kind, how)
+    if rows.scores is None and rows.ignore is not None and rows.ignore.any():
+        rows = rows.take(np.flatnonzero(~rows.ignore))  # truth, and what it does not judge is no detection
+    missing = np.setdiff1d(rows.recorded(), rows.t) if how.fill_empty else np.zeros(0)
+    if not len(rows.t) and not len(missing):
+        raise DataError(
+            "is empty, and how many frames were looked at is not known: put seqinfo.ini beside it, or write "
+            "a table with a row of t and sensor for each scan",
+            path,
+        )
+    scores = np.ones(len(rows.t)) if rows.scores is None else scale_scores(rows.scores, how.score_scale, path)
+    return assemble(rows.t, name, rows.boxes, scores, rows.classes, missing, rows.error), rows.first
+
+
+def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
+    """Read several files of one scene, such as one a sensor, into one.
+
+    Args:
+        paths: files, each alone or as `NAME=path` to name its sensor.
+        options: as `read_detections`, for all files; and `classes`, to take detections of these only, and
+            those without a class.
+
+    Raises:
+        DataError: as `read_detections`; or two files whose format does not name sensors are not told apart.
+    """
+    if not paths:
+        raise DataError("no detections file given")
+    # The files of some sensors may have classes and others none: chosen when they are together.
+    classes = options.pop("classes", None)
+    fmt, sensor = options.pop("fmt", None), options.pop("sensor", None)
+    how = Reading(**options)
+    found: list[tuple[Detections, int | None]] = []
+    unnamed: str | Path | None = None
+    for item in paths:
+        name, path = split_name(item)
+        name = name if name is not None else sensor
+        if name is None and not _names_sensors(path, fmt):
+            if unnamed is not None:
+                raise DataError(f"does not name its sensor, nor does {unnamed}; give NAME=path", path)
+            unnamed = path
+        found.append(_read_counted(path, name, fmt, how))
+    firsts = {first for _, first in found} - {None}
+    if len(firsts) > 1:
+        # Files of one scene count alike: one that begins later counts from 0 as those that have a frame 0 do.
+        note("frames count from 0 in all files, for one of them has a frame 0")
+        for k, (item, (_, first)) in enumerate(zip(paths, found, strict=True)):
+            if first == 1:
+                name, path = split_name(item)
+                found[k] = _read_counted(path, name or sensor, fmt, replace(how, first_frame=0))
+    parts = [one for one, _ in found]
+    whole = parts[0] if len(parts) == 1 else Detections.concatenate(parts)
+    return whole if classes is None else of_class_in(whole, classes, split_name(paths[0])[1])
+
+
+def _names_sensors(path: str | Path, fmt: str | None) -> bool:
+    """Tell whether a file can say which sensor its boxes are of."""
+    kind = recognise(path, fmt)
+    return kind in _TABLES and not (
+        counts_frames(path, kind) and "sensor" not in known_columns(path, _COLUMNS)
+    )
+
+
+def of_class_in(detections: Detections, classes: Sequence[str], path: str | Path) -> Detections:
+    """Keep the detections of some classes, and those of which none is known; errors name the file.
+
+    Raises:
+        DataError: no detection has a class, or none is of one of these.
+    """
+    try:
+        return detections.of_class(*classes)
+    except DataError as error:
+        raise DataError(error.message, path) from None
+
+
+def split_name(item: str | Path) -> tuple[str | None, str | Path]:
+    """Split `NAME=path` into the name and the path; a file that is called so goes first."""
+    match = re.fullmatch(r"([^=/\\]+)=(.+)", str(item))
+    if match is None or Path(item).exists():
+        return None, item
+    return match[1], match[2]
+
+
+def write_detections(detections: Detections, path: str | Path, decimals: int | None = None) -> None:
+    """Write detections as CSV, or as Parquet where the name ends so; empty scans are rows without a box.
+
+    Args:
+        detections: what to write.
+        path: the file; it appears only when it is complete.
+        decimals: decimals (px) to which boxes are rounded; by default every number is kept to the last bit.
+    """
+    t, sensor, boxes, scores, _, classes = detections.to_rows()
+    if decimals is not None:
+        boxes = round_decimals(boxes, decimals)
+    columns: dict[str, Any] = {"t": t, "sensor": sensor}
+    columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
+    columns["score"] = scores
+    if detections.classes is not None:
+        columns["class"] = classes
+    looks = detections.embedding_rows()
+    if looks is not None:
+        columns["embedding"] = looks
+    write_columns(columns, path)
+
+
+def _read_contract(path: str | Path, sensor: str | None, how: Reading) -> tuple[Detections, int | None]:
+    table = _table_of(path, sensor)
+    names = names_by_number(how.class_names, path, LISTS_COUNT_FROM)
+    rows = rows_of_detections(table, how, names, sensor)
+    del table  # the file's own columns are in the way of what is to come
+    return Detections.from_table(rows), rows.first
+
+
+def _table_of(path: str | Path, sensor: str | None) -> FileTable:
+    """Read a table; one that counts frames may lack the column `sensor`, as other formats do."""
+    required = ["t", *(() if sensor is not None else ("sensor",)), *BOX]
+    if sensor is None and counts_frames(path, "csv"):
+        required.remove("sensor")
+    try:
+        return read_table(path, required, OPTIONAL, short=("t", "sensor"), aliases=True, kinds=_KINDS)
+    except DataError as error:
+        if error.message.startswith("column 'sensor' is missing;"):
+            raise DataError(
+                "column 'sensor' is missing; name the sensor with NAME=path (in Python sensor=)",
+                error.path,
+                error.line,
+            ) from None
+        raise

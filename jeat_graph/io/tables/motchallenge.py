@@ -1,0 +1,188 @@
+"""MOTChallenge text: `frame, id, left, top, width, height, conf, …`, frames counted from 1.
+
+Frame k is at time (k - 1) / rate; or at k / rate in a file that has a frame 0. The rate is not in the file:
+it is the caller's, or that of the `seqinfo.ini` that MOTChallenge keeps beside (or in the folder above) its
+text files.
+
+What stands in columns 8 and up differs by year and is told by their number: with 9 columns the file is of
+2016 or later and column 8 is the class and 9 the visibility; with 10 columns, 8 to 10 are world coordinates,
+often -1, and there is no class, unless 8 holds whole numbers and 9 and 10 only marks. Column 7 is a
+detection's confidence; in truth, 0 there marks an object that is not to be judged.
+"""
+
+from __future__ import annotations
+
+import configparser
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.class_columns import name_classes
+from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.file_table import FileTable
+from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.io.files.zipped import LABELS, MEMBER, read_member
+from jeat_graph.io.tables.class_names import ClassNames, lines_of_names, names_by_number
+from jeat_graph.io.tables.plain_text import read_plain
+
+FIRST_FRAME = 1
+_FIRST_CLASS = 1
+_BASE = ("frame", "id", "left", "top", "width", "height")
+_COLUMNS = {
+    6: _BASE,
+    7: (*_BASE, "conf"),
+    8: (*_BASE, "conf", "class"),
+    9: (*_BASE, "conf", "class", "visibility"),
+    10: (*_BASE, "conf", "x", "y", "z"),
+}
+# Columns of 10 that may hold a class and two marks (cut off, hidden) instead of a place in the world.
+_WORLD = ("x", "y", "z")
+_MARKS = (np.array([-1, 0, 1]), np.array([-1, 0, 1, 2]))
+#: The labels of the 2016 and later challenges, from 1.
+CHALLENGE = (
+    "pedestrian",
+    "person_on_vehicle",
+    "car",
+    "bicycle",
+    "motorbike",
+    "non_motorized_vehicle",
+    "static_person",
+    "distractor",
+    "occluder",
+    "occluder_on_the_ground",
+    "occluder_full",
+    "reflection",
+    "crowd",
+)
+
+
+def read_lines(path: str | Path) -> FileTable:
+    """Read the columns `frame, id, left, top, width, height` and, if there, `conf` and `class`.
+
+    A file without any line is a table without rows; a zip that CVAT takes or gives (`MOT 1.1`) is read as the
+    text in it.
+
+    Raises:
+        DataError: names the first line with a wrong number of fields.
+    """
+    return read_plain(path, _COLUMNS, "MOTChallenge", read_member(path, MEMBER))
+
+
+def boxes_of(table: FileTable) -> FloatArray:
+    """Return left, top, width, height (R, 4) in px.
+
+    Raises:
+        DataError: names the first line where one of them is not a finite number.
+    """
+    return np.stack([table.number(name) for name in _BASE[2:]], axis=1)
+
+
+def class_names(
+    table: FileTable, said: ClassNames | None = None, challenge: bool = False
+) -> np.typing.NDArray[np.str_] | None:
+    """Return the class of each line (R,), or None without one.
+
+    Args:
+        table: the file's table.
+        said: names of classes that the user gives.
+        challenge: whether the numbers are those of the challenge where nobody says their names: so it is in
+            its truth, while detectors and trackers write numbers of their own.
+
+    Returns:
+        Names; numbers as text where no name is known; empty text where a number is negative.
+
+    Raises:
+        DataError: a class that is no whole number, or a list of names that cannot be read.
+    """
+    column = "class" if "class" in table else "x" if _class_before_marks(table) else None
+    if column is None:
+        return np.zeros(0, dtype=np.str_) if not len(table) else None
+    distinct, index = np.unique(table.whole(column), return_inverse=True)
+    texts = np.array(["" if number < 0 else str(number) for number in distinct], dtype=np.str_)
+    names = names_by_number(said, table.path, _FIRST_CLASS)
+    if names is None and table.path is not None:
+        names = _names_in_zip(table.path)
+    if names is None and challenge:
+        names = dict(enumerate(CHALLENGE, _FIRST_CLASS))
+    return name_classes(texts[index.reshape(-1)], names)
+
+
+def _class_before_marks(table: FileTable) -> bool:
+    """Whether columns 8 to 10 are a class and two marks, as VisDrone and some trackers write them."""
+    if "x" not in table or not len(table):
+        return False
+    kind, *marks = (table.number(name) for name in _WORLD)
+    whole = bool(np.all((kind == np.rint(kind)) & (kind >= -1)) and (kind >= 0).any())
+    return whole and all(np.isin(mark, known).all() for mark, known in zip(marks, _MARKS, strict=True))
+
+
+def _names_in_zip(path: Path) -> dict[int, str] | None:
+    data = read_member(path, LABELS)
+    if data is None:
+        return None
+    return dict(enumerate(lines_of_names(data.decode("utf-8", errors="replace")), _FIRST_CLASS))
+
+
+class SequenceInfo(NamedTuple):
+    """What `seqinfo.ini` says of a sequence; None where it says nothing.
+
+    Attributes:
+        rate_hz: frames per second.
+        length: number of frames.
+        size_px: width and height of the picture.
+        origin: the file.
+    """
+
+    rate_hz: float | None = None
+    length: int | None = None
+    size_px: tuple[int, int] | None = None
+    origin: Path | None = None
+
+
+def sequence_info(path: str | Path) -> SequenceInfo:
+    """Read the `seqinfo.ini` in the folder of a text file or the one above.
+
+    Raises:
+        DataError: there is one that cannot be read.
+    """
+    folder = Path(path).resolve().parent
+    info = next((p for p in (folder / "seqinfo.ini", folder.parent / "seqinfo.ini") if p.is_file()), None)
+    if info is None:
+        return SequenceInfo()
+    parser = configparser.ConfigParser(interpolation=None)
+    try:
+        parser.read(info, encoding="utf-8-sig")
+        rate = parser.getfloat("Sequence", "frameRate", fallback=None)
+        length = parser.getint("Sequence", "seqLength", fallback=None)
+        width = parser.getint("Sequence", "imWidth", fallback=None)
+        height = parser.getint("Sequence", "imHeight", fallback=None)
+    except (configparser.Error, ValueError, OSError) as error:
+        raise DataError(f"cannot be read: {' '.join(str(error).split())}", info) from None
+    size_px = (width, height) if width and height and min(width, height) > 0 else None
+    return SequenceInfo(rate, length, size_px, info)
+
+
+def sequence_rate(
+    path: str | Path, rate_hz: float | None, otherwise: float | None = None
+) -> tuple[float, int | None]:
+    """Return the frame rate (Hz) and the number of frames, if that is known.
+
+    Args:
+        path: the text file; `seqinfo.ini` is looked for in its folder and the one above.
+        rate_hz: the caller's rate, which goes before that of the file.
+        otherwise: rate where neither says one, for a file without any line.
+
+    Raises:
+        DataError: no rate is known, or it is not a positive number.
+    """
+    info = sequence_info(path)
+    rate = info.rate_hz if rate_hz is None else rate_hz
+    rate = otherwise if rate is None else rate
+    if rate is None:
+        raise DataError(
+            "MOTChallenge text has frame numbers only; give the frame rate with --rate (in Python rate_hz)",
+            path,
+        )
+    return check_rate(rate, path), info.length
