@@ -16,22 +16,40 @@ inline constexpr double kLog2E = 1.4426950408889634, kPi = 3.141592653589793;
 // ln 2 in two parts, the first with zeros at its end: its product with a whole number is exact.
 inline constexpr double kLn2High = 6.93147180369123816490e-01, kLn2Low = 1.90821492927058770002e-10;
 
-// 1/n, for the series below.
+// 1/n, and 1/n!, for the series below.
 inline constexpr auto kReciprocals = [] {
     std::array<double, 26> out{};
     for (int n = 1; n < 26; ++n) out[static_cast<std::size_t>(n)] = 1.0 / n;
     return out;
 }();
+inline constexpr auto kInverseFactorials = [] {
+    std::array<double, 15> out{};
+    double factorial = 1.0;
+    for (int n = 0; n < 15; ++n) {
+        out[static_cast<std::size_t>(n)] = 1.0 / factorial;
+        factorial *= n + 1;
+    }
+    return out;
+}();
 
-// e^x = 2^k e^r, |r| <= ln 2 / 2, by Taylor's series.
+// The nearest whole number, of a half the even one, where |x| < 2^51: what is added leaves no digits behind the point.
+inline double nearest_whole(double x) {
+    constexpr double kShift = 6755399441055744.0;  // 1.5 * 2^52
+    return (x + kShift) - kShift;
+}
+
+// e^x = 2^k e^r, |r| <= ln 2 / 2, by Taylor's series; its even and its odd terms are summed side by side.
 inline double exp_of(double x) {
     if (!(x < 709.0)) return x != x ? x : std::numeric_limits<double>::infinity();
     if (x < -708.0) return 0.0;
-    const double k = std::nearbyint(x * kLog2E);
-    const double r = (x - k * kLn2High) - k * kLn2Low;
-    double sum = kReciprocals[13];
-    for (int n = 13; n > 1; --n) sum = kReciprocals[n - 1] * (1.0 + r * sum);
-    sum = 1.0 + r * sum;
+    const double k = nearest_whole(x * kLog2E);
+    const double r = (x - k * kLn2High) - k * kLn2Low, r2 = r * r;
+    double even = kInverseFactorials[14], odd = kInverseFactorials[13];
+    for (int n = 12; n > 2; n -= 2) {
+        even = kInverseFactorials[n] + r2 * even;
+        odd = kInverseFactorials[n - 1] + r2 * odd;
+    }
+    const double sum = 1.0 + (r + r2 * (0.5 + (r * odd + r2 * even)));
     const auto power = static_cast<std::uint64_t>(static_cast<std::int64_t>(k) + 1023) << 52;
     return sum * std::bit_cast<double>(power);
 }
@@ -40,15 +58,23 @@ inline double exp_of(double x) {
 inline double log_of(double x) {
     if (!(x > 0.0)) return x == 0.0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
     if (x == std::numeric_limits<double>::infinity()) return x;
-    int k = 0;
-    double m = std::frexp(x, &k);
-    if (m < 0.70710678118654752) {
-        m *= 2.0;
-        --k;
+    double k = 0.0;
+    if (x < std::numeric_limits<double>::min()) x *= 18014398509481984.0, k = -54.0;  // 2^54
+    const auto bits = std::bit_cast<std::uint64_t>(x);
+    k += static_cast<double>(static_cast<std::int64_t>(bits >> 52) - 1023);
+    double m = std::bit_cast<double>((bits & 0x000fffffffffffff) | 0x3ff0000000000000);
+    if (m > 1.41421356237309505) {
+        m *= 0.5;
+        k += 1.0;
     }
-    const double s = (m - 1.0) / (m + 1.0), s2 = s * s;
-    double sum = 0.0;
-    for (int n = 25; n > 1; n -= 2) sum = s2 * (kReciprocals[n] + sum);
+    const double s = (m - 1.0) / (m + 1.0), s2 = s * s, s4 = s2 * s2;
+    // Every second term of the series, side by side.
+    double first = kReciprocals[23], second = kReciprocals[25];
+    for (int n = 21; n > 5; n -= 4) {
+        second = kReciprocals[n] + s4 * second;
+        first = kReciprocals[n - 2] + s4 * first;
+    }
+    const double sum = s2 * (kReciprocals[3] + (s2 * (kReciprocals[5] + s4 * second) + s4 * first));
     return k * kLn2High + (k * kLn2Low + 2.0 * (s + s * sum));
 }
 

@@ -73,10 +73,10 @@ inline double sides_log_density(const std::array<double, 4>& y, const SidesExpec
     return log_add(out, log_add(terms.log_body + body, terms.log_tail + tail));
 }
 
-// How far a box's left side may lie from the expected one at most.
-inline double reach(const SidesExpected& expected, const ModelConstants& c) {
-    const double whole = std::max(expected.S[0].ll, expected.wide[0].ll / c.outlier_gate);
-    return std::max(std::max(1.0, c.most_uncovered) * expected.size[0], std::sqrt(c.gate * whole));
+// How far a box's left side (axis 0), or its top, may lie from the expected one at most.
+inline double reach(const SidesExpected& expected, int axis, const ModelConstants& c) {
+    const double whole = std::max(expected.S[axis].ll, expected.wide[axis].ll / c.outlier_gate);
+    return std::max(std::max(1.0, c.most_uncovered) * expected.size[axis], std::sqrt(std::max(c.gate, c.cut_gate) * whole));
 }
 
 }  // namespace jeat::association

@@ -134,29 +134,23 @@ inline void update_axis(double* mean, double* P, double left, double right, doub
     const auto extent = [half](const double* PH) { return half * (PH[kLogSize] + PH[kSizeError]); };
     const Pair2 S{centre(PHl) - extent(PHl) + Rl, centre(PHr) - extent(PHr), centre(PHr) + extent(PHr) + Rr};
     const double det = S.determinant();
-    Matrix A{};
     double Kl[kStates], Kr[kStates];
     for (int i = 0; i < kStates; ++i) {
         Kl[i] = (PHl[i] * S.rr - PHr[i] * S.lr) / det;
         Kr[i] = (PHr[i] * S.ll - PHl[i] * S.lr) / det;
         mean[i] += Kl[i] * left + Kr[i] * right;
-        A[i * kStates + i] = 1.0;
-        for (const int k : {kPosition, kPositionError}) A[i * kStates + k] -= Kl[i] + Kr[i];
-        for (const int k : {kLogSize, kSizeError}) A[i * kStates + k] += half * (Kl[i] - Kr[i]);
     }
+    // With A = I - K H: first A P = P - K (P H')', then (A P) A' = A P - (A P H') K'.
     Matrix AP;
     for (int i = 0; i < kStates; ++i)
-        for (int j = 0; j < kStates; ++j) {
-            double sum = 0.0;
-            for (int k = 0; k < kStates; ++k) sum += A[i * kStates + k] * P[k * kStates + j];
-            AP[i * kStates + j] = sum;
-        }
-    for (int i = 0; i < kStates; ++i)
-        for (int j = i; j < kStates; ++j) {
-            double sum = Kl[i] * Rl * Kl[j] + Kr[i] * Rr * Kr[j];
-            for (int k = 0; k < kStates; ++k) sum += AP[i * kStates + k] * A[j * kStates + k];
-            P[i * kStates + j] = P[j * kStates + i] = sum;
-        }
+        for (int j = 0; j < kStates; ++j) AP[i * kStates + j] = P[i * kStates + j] - (Kl[i] * PHl[j] + Kr[i] * PHr[j]);
+    for (int i = 0; i < kStates; ++i) {
+        const double* const row = AP.data() + i * kStates;
+        const double p = row[kPosition] + row[kPositionError], l = half * (row[kLogSize] + row[kSizeError]);
+        const double by_left = Kl[i] * Rl - (p - l), by_right = Kr[i] * Rr - (p + l);
+        for (int j = i; j < kStates; ++j)
+            P[i * kStates + j] = P[j * kStates + i] = row[j] + (by_left * Kl[j] + by_right * Kr[j]);
+    }
 }
 
 // P grows by d^2 along one side: by [1/2, along] of [p, l].

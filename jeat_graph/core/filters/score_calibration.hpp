@@ -39,13 +39,7 @@ struct RepeatCounts {
         if (has_last && scans > 1) {
             for (std::size_t i = 0; i < last_boxes.size(); ++i) {
                 const bool again = has_after[i] && last_had_before[i];
-                for (int g = 0; g < kScoreBins; ++g) {
-                    const double distance = (kFirstLogit + g * kLogitStep - last_logits[i]) / kBandwidth;
-                    if (std::abs(distance) > 8.0) continue;  // less than 1e-13 of the whole
-                    const double share = exp_of(-0.5 * distance * distance) * (kLogitStep / kBandwidth / std::sqrt(2.0 * kPi));
-                    boxes[g] += share;
-                    if (again) repeated[g] += share;
-                }
+                spread(last_logits[i], again);
             }
         }
         scans += 1;
@@ -53,6 +47,32 @@ struct RepeatCounts {
         last_logits = logits;
         last_had_before = std::move(had_before);
         has_last = true;
+    }
+
+    // Count a box in the bins around its logit, by a normal density: from the nearest one outwards each follows from
+    // the one before by a ratio that itself falls by a constant factor.
+    void spread(double logit, bool again) {
+        constexpr double kStep = kLogitStep / kBandwidth, kFarthest = 8.0;  // beyond is less than 1e-13 of the whole
+        const double place = clamp((logit - kFirstLogit) / kLogitStep, 0.0, kScoreBins - 1.0);
+        const int nearest = static_cast<int>(nearest_whole(place));
+        const double distance = (kFirstLogit + nearest * kLogitStep - logit) / kBandwidth;
+        if (std::abs(distance) > kFarthest) return;
+        const double most = exp_of(-0.5 * distance * distance) * (kStep / std::sqrt(2.0 * kPi));
+        const double falls = exp_of(-kStep * kStep);
+        const auto count = [&](int bin, double share) {
+            boxes[bin] += share;
+            if (again) repeated[bin] += share;
+        };
+        count(nearest, most);
+        for (const int way : {-1, 1}) {
+            double share = most, ratio = exp_of(-kStep * (way * distance + 0.5 * kStep));
+            for (int bin = nearest + way; bin >= 0 && bin < kScoreBins; bin += way) {
+                share *= ratio;
+                ratio *= falls;
+                if (std::abs(distance + way * kStep * std::abs(bin - nearest)) > kFarthest) break;
+                count(bin, share);
+            }
+        }
     }
 
     static constexpr double kLeastBoxes = 1e-9;

@@ -156,6 +156,11 @@ struct Densities {
           rho2(side_variance) {}
 };
 
+// Columns of F that are not zero in each row: a state follows from itself and those that drive it.
+inline constexpr int kDriven[kStates][2] = {{kPosition, kAcceleration}, {kVelocity, kAcceleration}, {kAcceleration, kAcceleration},
+                                            {kLogSize, kGrowth}, {kGrowth, kGrowth}, {kPositionError, kPositionError},
+                                            {kSizeError, kSizeError}};
+
 // m <- F m, P <- F P F' + Q.
 inline void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
                     const ModelConstants& c) {
@@ -164,7 +169,7 @@ inline void predict(double* mean, double* covariance, const Discretised& step, d
     std::array<double, kMean> predicted{};
     for (int axis = 0; axis < 2; ++axis)
         for (int i = 0; i < kStates; ++i)
-            for (int j = i; j < kStates; ++j)
+            for (int j = kDriven[i][0]; j <= kDriven[i][1]; ++j)
                 predicted[axis * kStates + i] += F[i * kStates + j] * mean[axis * kStates + j];
     const double growth = 0.5 * (std::abs(predicted[kGrowth]) + std::abs(predicted[kStates + kGrowth]));
     const double g = std::min(growth, c.fastest_growth);
@@ -174,15 +179,12 @@ inline void predict(double* mean, double* covariance, const Discretised& step, d
         double* const P = covariance + axis * kMatrix;
         Matrix FP{};
         for (int i = 0; i < kStates; ++i)
-            for (int k = i; k < kStates; ++k) {
-                const double f = F[i * kStates + k];
-                if (f == 0.0) continue;
-                for (int j = 0; j < kStates; ++j) FP[i * kStates + j] += f * P[k * kStates + j];
-            }
+            for (int k = kDriven[i][0]; k <= kDriven[i][1]; ++k)
+                for (int j = i; j < kStates; ++j) FP[i * kStates + j] += F[i * kStates + k] * P[k * kStates + j];
         for (int i = 0; i < kStates; ++i)
             for (int j = i; j < kStates; ++j) {
                 double sum = 0.0;
-                for (int k = j; k < kStates; ++k) sum += FP[i * kStates + k] * F[j * kStates + k];
+                for (int k = kDriven[j][0]; k <= kDriven[j][1]; ++k) sum += FP[i * kStates + k] * F[j * kStates + k];
                 const int at = i * kStates + j;
                 sum += by_jerk * step.jerk[at] + q.growth * step.growth[at] + q.size * step.size[at] +
                        by_walk * step.position[at];

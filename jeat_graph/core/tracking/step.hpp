@@ -254,8 +254,10 @@ private:
                                    association::kLeastPDetect, association::kMostPDetect);
             const double clutter = terms.log_clutter - log_of(expected.size[0] * expected.size[1]);
             const double real = std::max(tracks.real[i], association::kLeastPosterior);
-            const double start = log_of(p / (1.0 - p)) - clutter, reach = association::reach(expected, c_);
+            const double start = log_of(p / (1.0 - p)) - clutter, reach = association::reach(expected, 0, c_);
+            const double above = association::reach(expected, 1, c_);
             index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j) {
+                if (std::abs(boxes_[j].top - expected.box.top) > above) return;
                 const auto y = side_innovations(boxes_[j], expected.box);
                 const Edges cut = unmeasured(y, edges_[j]);
                 const double density =
