@@ -35,6 +35,8 @@ def judge_engines(run: Path, truth: Path, camera: RoadCamera) -> dict[str, dict[
     found = {}
     for name, boxes, smoother in ((GRAPH, taken, "graph"), (PICTURE, picture, "spline")):
         with tempfile.TemporaryDirectory() as folder:
-            write_smoothed(follow_boxes(boxes, camera, CuboidConfig(), smoother=smoother), Path(folder))
+            write_smoothed(
+                follow_boxes(boxes, camera, CuboidConfig(), smoother=smoother).vehicles, Path(folder)
+            )
             found[name] = judge_road_run(Path(folder) / ROAD_SMOOTHED, truth)["road_smoothed"]
     return found

@@ -73,7 +73,7 @@ def judge_camera(folder: Path, which: str, every: int) -> dict[str, Any]:
     sample = PointTable(points.t[keep], points.track_id[keep], points.pixels[keep])
     vehicles = [
         v
-        for v in follow_points(sample, camera, MotionFitConfig(), ContactConfig())
+        for v in follow_points(sample, camera, MotionFitConfig(), ContactConfig())[0]
         if v.t[-1] - v.t[0] > _LEAST_S
     ]
     gates = _read_gates(folder / "speeds.csv")

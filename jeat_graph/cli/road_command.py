@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+from collections import Counter
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.options import add_frames, frames_read
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
+
+if TYPE_CHECKING:
+    from jeat_graph.road.results import RoadResult
 
 WRITES_INTO = ("out",)
 HELP = "metres, km/h and lanes on the road, each with its uncertainty"
@@ -93,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
         seen = boxes_of(args.source, camera, BoxConfig(), partial(say, "road"), sys.stderr.isatty(), **how)
         total = len(seen)
         with _bar(total) as bar:
-            sized = follow_boxes(
+            sized, left_out = follow_boxes(
                 seen, camera, CuboidConfig(), BOX_MOTION, lambda done, _: _advance(bar, done), args.smoother
             )
         contact = ContactConfig(0.0, 0.0, 0.0)
@@ -103,21 +108,37 @@ def run(args: argparse.Namespace) -> int:
         total = len(points.tracks())
         sized = []
         with _bar(total) as bar:
-            vehicles = follow_points(
+            vehicles, left_out = follow_points(
                 points, camera, MotionFitConfig(), contact, lambda done, _: _advance(bar, done)
             )
     span_s = recording_span_of(args.source, **how)
-    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, span_s)
+    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, span_s, left_out)
     write_result(result, out)
     traffic = SummaryConfig() if args.interval is None else SummaryConfig(interval_s=args.interval)
     write_columns(count_columns(result, traffic), out / "counts.csv")
     write_columns(headway_columns(result, traffic), out / "headways.csv")
     write_road_page(result, camera, traffic, Path(args.source).name or str(args.source), out / "road.html")
-    if total > len(vehicles):
-        say("road", f"{total - len(vehicles)} tracks too short, or not on the road, are left out")
+    for text in _notes(result):
+        say("road", text)
     lanes, crossings = len(result.lanes.names), len(result.crossings)
     print(f"{len(vehicles)} vehicles, {lanes} lanes, {crossings} crossings: {out}")
     return 0
+
+
+def _notes(result: RoadResult) -> list[str]:
+    """Return what is not told, and why."""
+    notes = [
+        f"{count} tracks are left out, {reason} (left_out.csv)"
+        for reason, count in Counter(one.reason for one in result.left_out).items()
+    ]
+    if result.vehicles and not result.lanes.names:
+        notes.append("no lanes: the vehicles show none")
+    unknown = sum(not math.isfinite(one.kmh) for one in result.speeds)
+    if unknown:
+        notes.append(f"of {unknown} vehicles the speed is not known well enough to be told")
+    if any(result.parked):
+        notes.append(f"{sum(result.parked)} vehicles stood all the time (parked in speeds.csv)")
+    return notes
 
 
 def _bar(total: int) -> Any:

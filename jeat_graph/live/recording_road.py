@@ -90,11 +90,12 @@ def _write_road(run: Path, camera_file: str) -> int:
     from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
 
     camera, out, traffic = read_camera(camera_file), run / ROAD, SummaryConfig()
-    sized = follow_boxes(boxes_of(run, camera, BoxConfig()), camera, CuboidConfig())
+    sized, left_out = follow_boxes(boxes_of(run, camera, BoxConfig()), camera, CuboidConfig())
     vehicles = [one.vehicle for one in sized]
     marks = RoadMarks({}, {})
     contact = ContactConfig(0.0, 0.0, 0.0)
-    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, recording_span_of(run))
+    span_s = recording_span_of(run)
+    result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, span_s, left_out)
     write_result(result, out)
     write_columns(count_columns(result, traffic), out / "counts.csv")
     write_columns(headway_columns(result, traffic), out / "headways.csv")

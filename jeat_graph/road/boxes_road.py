@@ -12,10 +12,10 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.road.box_errors import BoxRows
 from jeat_graph.road.box_rows import BoxConfig, rows_of_table
 from jeat_graph.road.camera import RoadCamera
-from jeat_graph.road.cuboid_fit import CuboidConfig, fit_cuboid
+from jeat_graph.road.cuboid_fit import CuboidConfig, CuboidFit, begin, fit_cuboid
 from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.motion_fit import MotionFitConfig
-from jeat_graph.road.results import Size
+from jeat_graph.road.results import LeftOut, Size
 from jeat_graph.road.speeds import Vehicle
 
 #: Boxes tell accelerations better than a single tracked point does, so the motion may be less stiff.
@@ -28,7 +28,7 @@ class SizedVehicle(NamedTuple):
     Attributes:
         vehicle: its motion.
         size: its size.
-        kind: its class.
+        kind: its class, empty where its length is not known well enough to tell.
         chi2: mean square of its boxes' residuals in their stated errors.
     """
 
@@ -36,6 +36,18 @@ class SizedVehicle(NamedTuple):
     size: Size
     kind: str
     chi2: float
+
+
+class FollowedBoxes(NamedTuple):
+    """What became of tracks.
+
+    Attributes:
+        vehicles: those that are vehicles on the road.
+        left_out: those that are none.
+    """
+
+    vehicles: list[SizedVehicle]
+    left_out: list[LeftOut]
 
 
 class TrackBoxes(NamedTuple):
@@ -77,7 +89,7 @@ def follow_boxes(
     motion: MotionFitConfig = BOX_MOTION,
     progress: Callable[[int, int], None] | None = None,
     smoother: str = "spline",
-) -> list[SizedVehicle]:
+) -> FollowedBoxes:
     """Fit every track.
 
     Args:
@@ -95,13 +107,28 @@ def follow_boxes(
 
         fit_one = fit_graph
     found: list[SizedVehicle] = []
+    left_out: list[LeftOut] = []
     for k, one in enumerate(tracks):
         fit = fit_one(one.rows, camera, config, motion)
         if fit is not None:
             mean, spread = fit.size.tolist(), np.diag(fit.size_covariance).tolist()
             size = Size((mean[0], mean[1], mean[2]), (spread[0], spread[1], spread[2]))
             vehicle = Vehicle(one.track_id, one.t, fit.motion, fit.by_calibration, 0.0, 0.0)
-            found.append(SizedVehicle(vehicle, size, CLASSES[fit.kind].name, fit.chi2))
+            found.append(SizedVehicle(vehicle, size, class_by_length(fit), fit.chi2))
+        else:
+            begun = begin(one.rows, camera, config, motion) is not None
+            reason = "no vehicle makes such boxes" if begun else "too little of it is on the road"
+            left_out.append(LeftOut(one.track_id, float(one.t[0]), float(one.t[-1]), reason))
         if progress is not None:
             progress(k + 1, len(tracks))
-    return found
+    return FollowedBoxes(found, left_out)
+
+
+def class_by_length(fit: CuboidFit) -> str:
+    """Return the class, or nothing where the boxes tell the length worse than the lengths of a class differ.
+
+    The fit knows the class's own lengths beforehand: where the boxes tell nothing, its variance is theirs,
+    and half of it where the boxes tell as much.
+    """
+    one = CLASSES[fit.kind]
+    return one.name if fit.size_covariance[0, 0] <= 0.5 * one.spread[0] ** 2 else ""

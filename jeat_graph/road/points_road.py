@@ -13,8 +13,8 @@ from jeat_graph.road.crossings import crossing, road_line
 from jeat_graph.road.inputs import PointTable, RoadMarks
 from jeat_graph.road.lanes import LaneConfig, find_lanes, given_lanes
 from jeat_graph.road.motion_fit import MotionFitConfig
-from jeat_graph.road.results import NO_SIZE, RoadResult
-from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle
+from jeat_graph.road.results import NO_SIZE, LeftOut, RoadResult
+from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle, told
 
 
 def follow_points(
@@ -23,19 +23,35 @@ def follow_points(
     motion: MotionFitConfig,
     contact: ContactConfig,
     progress: Callable[[int, int], None] | None = None,
-) -> list[Vehicle]:
-    """Fit every track that stays long enough on the road; `progress` hears how many of how many are done."""
+) -> tuple[list[Vehicle], list[LeftOut]]:
+    """Fit every track that stays long enough on the road, and return the others too.
+
+    `progress` hears how many of how many are done.
+    """
     tracks = points.tracks()
-    vehicles = []
+    vehicles, left_out = [], []
     for k, rows in enumerate(tracks):
-        one = fit_vehicle(
-            int(points.track_id[rows.start]), points.t[rows], points.pixels[rows], camera, motion, contact
-        )
+        track_id, t = int(points.track_id[rows.start]), points.t[rows]
+        one = fit_vehicle(track_id, t, points.pixels[rows], camera, motion, contact)
         if one is not None:
             vehicles.append(one)
+        else:
+            left_out.append(LeftOut(track_id, float(t[0]), float(t[-1]), "too little of it is on the road"))
         if progress is not None:
             progress(k + 1, len(tracks))
-    return vehicles
+    return vehicles, left_out
+
+
+# A vehicle that is seen for so long (s), and is all that time within so much (m), is parked.
+_PARKED_S, _PARKED_M = 5.0, 1.5
+_PARKED_SAMPLES = 33
+
+
+def is_parked(vehicle: Vehicle) -> bool:
+    """Whether a vehicle stood all the time that it was seen."""
+    start, end = vehicle.fit.window()
+    places = vehicle.fit.at(np.linspace(start, end, _PARKED_SAMPLES))
+    return bool(end - start >= _PARKED_S and (np.ptp(places, axis=0) <= _PARKED_M).all())
 
 
 #: Name of the line that is used where none is given.
@@ -62,37 +78,45 @@ def summarise(
     lane_config: LaneConfig,
     sized: Sequence[SizedVehicle] = (),
     span_s: tuple[float, float] | None = None,
+    left_out: Sequence[LeftOut] = (),
 ) -> RoadResult:
     """Speeds, lanes and crossings of fitted vehicles.
 
     A vehicle's speed is its mean between the first and the last line that it crosses, where lines are given
     and it crosses two; otherwise over all of its track that the fit believes. Where no line is given,
     crossings are those of a line across the road where most vehicles come by (`MIDDLE`). `span_s` says when
-    the recording began and ended (s), for the intervals in which nobody came by.
+    the recording began and ended (s), for the intervals in which nobody came by. Parked vehicles show no
+    lanes, and are in none.
     """
-    middle = np.array([v.fit.at(np.array(np.mean(v.fit.window())))[0] for v in vehicles], dtype=np.float64)
-    lanes = given_lanes(marks.lanes) if marks.lanes else find_lanes(middle, lane_config)
+    when = [np.array(np.mean(v.fit.window())) for v in vehicles]
+    middle = np.array([v.fit.at(t)[0] for v, t in zip(vehicles, when, strict=True)], dtype=np.float64)
+    velocity = np.array([v.fit.at(t, 1) for v, t in zip(vehicles, when, strict=True)]).reshape(-1, 2)
+    parked = np.array([is_parked(vehicle) for vehicle in vehicles], dtype=np.bool_)
+    found_lanes = find_lanes(middle[~parked], velocity[~parked], lane_config)
+    lanes = given_lanes(marks.lanes) if marks.lanes else found_lanes
     ends = {name: road_line(camera, line, contact.height_m) for name, line in marks.lines.items()}
     if not ends and vehicles:
         ends = {MIDDLE: _middle_line(vehicles)}
     crossings, speeds = [], []
     for k, vehicle in enumerate(vehicles):
         own = [(name, crossing(vehicle, line)) for name, line in ends.items() if line is not None]
-        found = [(name, k, one) for name, one in own if one is not None]
+        found = [(name, k, one._replace(speed=told(one.speed))) for name, one in own if one is not None]
         crossings += found
         start, end = vehicle.fit.window()
         times = sorted(one.t for _, _, one in found)
         if len(times) > 1 and times[-1] > times[0]:
             start, end = times[0], times[-1]
-        speeds.append(vehicle.mean_speed(start, end))
+        speeds.append(told(vehicle.mean_speed(start, end)))
     return RoadResult(
         vehicles=vehicles,
         sizes=[one.size for one in sized] if sized else [NO_SIZE] * len(vehicles),
         classes=[one.kind for one in sized] if sized else [""] * len(vehicles),
+        parked=parked.tolist(),
         speeds=speeds,
-        lane_names=[str(name) for name in lanes.of(middle)] if len(middle) else [],
+        lane_names=np.where(parked, "", lanes.of(middle)).tolist() if len(middle) else [],
         lanes=lanes,
         crossings=crossings,
         lines=sorted(ends),
         span_s=span_s,
+        left_out=left_out,
     )

@@ -33,6 +33,21 @@ class Size(NamedTuple):
     var: tuple[float, float, float]
 
 
+class LeftOut(NamedTuple):
+    """A track that is no vehicle on the road.
+
+    Attributes:
+        track_id: its identity.
+        t_first, t_last: its first and last time (s).
+        reason: why.
+    """
+
+    track_id: int
+    t_first: float
+    t_last: float
+    reason: str
+
+
 NO_SIZE = Size((np.nan,) * 3, (np.nan,) * 3)
 
 
@@ -44,23 +59,27 @@ class RoadResult:
         vehicles: the vehicles.
         sizes: their sizes, in the same order.
         classes: their classes by length, empty where nothing tells.
-        speeds: their mean speeds.
+        parked: which of them stood all the time.
+        speeds: their mean speeds; NaN where they are not known.
         lane_names: the lanes that they were in most.
         lanes: the lanes.
         crossings: line, place of the vehicle in `vehicles`, and the crossing.
         lines: names of all lines, those too that nobody crosses.
         span_s: begin and end of the recording (s); None where only the crossings tell.
+        left_out: the tracks that are no vehicles on the road.
     """
 
     vehicles: Sequence[Vehicle]
     sizes: Sequence[Size]
     classes: Sequence[str]
+    parked: Sequence[bool]
     speeds: Sequence[Speed]
     lane_names: Sequence[str]
     lanes: Lanes
     crossings: Sequence[tuple[str, int, Crossing]]
     lines: Sequence[str] = ()
     span_s: tuple[float, float] | None = None
+    left_out: Sequence[LeftOut] = ()
 
 
 def road_columns(vehicle: Vehicle, size: Size) -> dict[str, npt.NDArray[Any]]:
@@ -144,6 +163,7 @@ def speed_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
         "lane": np.array(result.lane_names, dtype=np.str_),
         "class": np.array(result.classes, dtype=np.str_),
         **rounded,
+        "parked": np.array(result.parked, dtype=np.int64),
     }
 
 
@@ -163,8 +183,18 @@ def crossing_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
     return columns
 
 
+def left_out_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
+    """Rows of `left_out.csv`, one a track that is no vehicle on the road."""
+    return {
+        "track_id": np.array([one.track_id for one in result.left_out], dtype=np.int64),
+        "t_first": np.array([one.t_first for one in result.left_out], dtype=np.float64),
+        "t_last": np.array([one.t_last for one in result.left_out], dtype=np.float64),
+        "reason": np.array([one.reason for one in result.left_out], dtype=np.str_),
+    }
+
+
 def write_result(result: RoadResult, folder: str | Path) -> None:
-    """Write `road.csv`, `speeds.csv` and `crossings.csv` into a folder, each whole or not at all."""
+    """Write the tables of vehicles, crossings and tracks left out, each whole or not at all."""
     from jeat_graph.io.tables.table_writer import TableWriter, write_columns
 
     with TableWriter(Path(folder) / "road.csv") as writer:
@@ -174,6 +204,7 @@ def write_result(result: RoadResult, folder: str | Path) -> None:
             writer.append(road_columns(vehicle, size))
     write_columns(speed_columns(result), Path(folder) / "speeds.csv")
     write_columns(crossing_columns(result), Path(folder) / "crossings.csv")
+    write_columns(left_out_columns(result), Path(folder) / "left_out.csv")
 
 
 def empty_road_columns() -> dict[str, npt.NDArray[Any]]:

@@ -54,7 +54,9 @@ def write_run_tables(folder: Path, config: Config, camera: RoadCamera) -> None:
         return
     smoothed = read_trajectories(folder / "smoothed.csv")
     tracks = boxes_of_log(log, smoothed, camera, BoxConfig())
-    write_smoothed(follow_boxes(tracks, camera, CuboidConfig(), smoother=config.smoother.road), folder)
+    write_smoothed(
+        follow_boxes(tracks, camera, CuboidConfig(), smoother=config.smoother.road).vehicles, folder
+    )
 
 
 def write_smoothed(vehicles: Sequence[SizedVehicle], folder: Path) -> None:

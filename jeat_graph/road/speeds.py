@@ -57,6 +57,17 @@ class Speed(NamedTuple):
     high_kmh: float
 
 
+#: A speed is not told where its 95 % interval reaches farther than this, and than this share of the speed.
+_MOST_REACH_KMH, _MOST_REACH_SHARE = 10.0, 0.5
+UNKNOWN_SPEED = Speed(math.nan, math.nan, math.nan, math.nan, math.nan)
+
+
+def told(speed: Speed) -> Speed:
+    """Return a speed, or `UNKNOWN_SPEED` where next to nothing is known of it."""
+    reach = speed.high_kmh - speed.kmh
+    return speed if reach <= max(_MOST_REACH_KMH, _MOST_REACH_SHARE * speed.kmh) else UNKNOWN_SPEED
+
+
 def interval(kmh: float, noise: float, calibration: float) -> Speed:
     """Add the 95 % interval to a speed with two independent standard deviations (km/h)."""
     half = Z95 * math.hypot(noise, calibration)

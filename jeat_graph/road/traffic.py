@@ -123,9 +123,10 @@ def speed_summary(speeds: Sequence[Any], config: SummaryConfig) -> tuple[float, 
     """Mean and 85th percentile of speeds (km/h), each with the ends of its 95 % interval; NaN of no speed.
 
     Args:
-        speeds: `Speed`s, whose calibration part is common to all.
+        speeds: `Speed`s, whose calibration part is common to all; those that are not known do not count.
         config: how many draws of the errors there are; they are the same ones every time.
     """
+    speeds = [one for one in speeds if math.isfinite(one.kmh)]
     if not speeds:
         return (math.nan,) * len(_SPEEDS)
     kmh, noise, common = (

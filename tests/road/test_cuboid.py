@@ -12,6 +12,7 @@ from road_scenes import camera
 from jeat_graph.road.box_channels import HIGH, LOW, NEITHER, WHOLE, directions, linearise, measured
 from jeat_graph.road.box_errors import BoxRows, robust_weights, whiten
 from jeat_graph.road.box_rows import BoxConfig, rows_of_table
+from jeat_graph.road.boxes_road import class_by_length
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.cuboid import sides
 from jeat_graph.road.cuboid_fit import CuboidConfig, CuboidFit, fit_cuboid
@@ -218,3 +219,11 @@ def test_what_no_vehicle_is_as_small_as_is_no_vehicle() -> None:
         boxes = np.c_[box[:, :2], box[:, 2:] - box[:, :2]]
         rows = rows_of_table(t, boxes, np.zeros((len(t), 4)), (cam.width, cam.height), BoxConfig())
         assert (fit_cuboid(rows, cam, CuboidConfig(), MOTION) is not None) is found, size
+
+
+@pytest.mark.parametrize(("share", "name"), [(0.1, "truck"), (0.49, "truck"), (0.6, ""), (1.0, "")])
+def test_a_class_is_told_where_the_boxes_tell_the_length_better_than_the_class_does(share, name) -> None:
+    kind = max(range(len(CLASSES)), key=lambda k: CLASSES[k].mean[0])
+    mean, spread = np.array(CLASSES[kind].mean), np.array(CLASSES[kind].spread)
+    fit = CuboidFit(None, np.zeros((0, 0)), kind, mean, np.diag(share * spread**2), 1.0)
+    assert class_by_length(fit) == name

@@ -84,7 +84,7 @@ def test_from_points_to_speeds(
     speeds = _rows(out / "speeds.csv")
     assert list(speeds[0]) == [
         *("track_id", "t_first", "t_last", "lane", "class", "length"),
-        *("speed_kmh", "low_kmh", "high_kmh", "sigma_noise_kmh", "sigma_calibration_kmh"),
+        *("speed_kmh", "low_kmh", "high_kmh", "sigma_noise_kmh", "sigma_calibration_kmh", "parked"),
     ]
     errors = [float(row["speed_kmh"]) - 3.6 * true[int(row["track_id"])] for row in speeds]
     assert np.abs(errors).mean() < 0.9

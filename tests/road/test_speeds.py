@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from road_scenes import camera, drives, see
 from jeat_graph.road.crossings import crossing, road_line
 from jeat_graph.road.lanes import LaneConfig, find_lanes
 from jeat_graph.road.motion_fit import MotionFitConfig, error_covariance, fit_motion, thinned
-from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle
+from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle, interval, told
 
 MOTION = MotionFitConfig()
 ON_ROAD = ContactConfig(height_m=0.0, height_sd_m=0.0, spread_m=0.0)
@@ -141,10 +142,37 @@ def test_a_line_is_crossed_when_the_vehicle_is_there() -> None:
 def test_lanes_are_where_vehicles_drive() -> None:
     rng = np.random.default_rng(6)
     x = np.concatenate([-1.8 + 0.3 * rng.standard_normal(200), 1.9 + 0.3 * rng.standard_normal(90)])
-    lanes = find_lanes(x, LaneConfig())
+    velocity = np.stack([0.5 * rng.standard_normal(290), np.where(x < 0.0, -25.0, 25.0)], axis=1)
+    lanes = find_lanes(x, velocity, LaneConfig())
     assert lanes.names == ("1", "2")
     np.testing.assert_allclose(lanes.middle, [-1.8, 1.9], atol=0.15)
     assert list(lanes.of(np.array([-2.0, 1.5, 9.0]))) == ["1", "2", ""]
+
+
+def test_where_many_drive_across_there_are_no_lanes() -> None:
+    """A junction: two ways along the road, two across it, and turns between them."""
+    rng = np.random.default_rng(7)
+    x = np.concatenate([-1.8 + 0.3 * rng.standard_normal(50), 1.9 + 0.3 * rng.standard_normal(50)])
+    along = np.stack([np.zeros(100), np.full(100, 12.0)], axis=1)
+    turns = rng.uniform(-1.0, 1.0, (60, 2)) * 10.0
+    places = np.concatenate([x, rng.uniform(-20, 20, 60)])
+    found = find_lanes(places, np.concatenate([along, turns]), LaneConfig())
+    assert found.names == ()
+    assert find_lanes(x, along, LaneConfig()).names == ("1", "2")
+    assert find_lanes(np.zeros(0), np.zeros((0, 2)), LaneConfig()).names == ()
+
+
+def test_vehicles_anywhere_across_the_road_show_no_lanes_of_their_own() -> None:
+    x = np.random.default_rng(8).uniform(-9.0, 9.0, 2000)
+    lanes = find_lanes(x, np.tile((0.0, 20.0), (2000, 1)), LaneConfig())
+    assert len(lanes.names) <= 1
+
+
+def test_a_speed_of_which_next_to_nothing_is_known_is_not_told() -> None:
+    assert told(interval(80.0, 5.0, 1.0)) == interval(80.0, 5.0, 1.0)
+    assert told(interval(0.0, 4.0, 0.0)).kmh == 0.0
+    assert math.isnan(told(interval(78.8, 100.0, 0.0)).kmh)
+    assert math.isnan(told(interval(3.0, 8.0, 0.0)).low_kmh)
 
 
 def test_all_of_many_vehicles_are_unbiased() -> None:

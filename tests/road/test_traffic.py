@@ -15,7 +15,7 @@ from jeat_graph.road.inputs import RoadMarks
 from jeat_graph.road.lanes import LaneConfig
 from jeat_graph.road.motion_fit import MotionFit
 from jeat_graph.road.points_road import summarise
-from jeat_graph.road.results import RoadResult, Size
+from jeat_graph.road.results import LeftOut, RoadResult, Size, left_out_columns, speed_columns
 from jeat_graph.road.road_page import render_road_page
 from jeat_graph.road.speeds import ContactConfig, Speed, Vehicle, interval
 from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns, speed_summary
@@ -149,6 +149,27 @@ def test_the_page_holds_everything_and_asks_for_nothing() -> None:
     for lane in ("slow", "fast"):
         assert f"Lane {lane}" in page
     assert page == render_road_page(_result(), camera(), SummaryConfig(), "<road> & co")
+
+
+def test_who_stands_all_the_time_is_parked_and_shows_no_lane() -> None:
+    standing = [_vehicle(10 + k, 9.0, 10.0 + 5.0 * k, 0.0) for k in range(3)]
+    longer = [
+        one._replace(vehicle=replace(one.vehicle, fit=one.vehicle.fit._replace(t=3.0 * one.vehicle.fit.t)))
+        for one in standing
+    ]
+    sized = [_vehicle(k, 0.0, 10.0 + 3.0 * k, 20.0) for k in range(4)] + longer
+    vehicles = [one.vehicle for one in sized]
+    out = LeftOut(99, 1.0, 2.0, "too little of it is on the road")
+    none = RoadMarks({}, {})
+    contact = ContactConfig(0.0, 0.0, 0.0)
+    result = summarise(vehicles, camera(), none, contact, LaneConfig(), sized, None, [out])
+    assert list(result.parked) == [False] * 4 + [True] * 3
+    assert result.lanes.names == ("1",)
+    assert list(result.lane_names) == ["1"] * 4 + [""] * 3
+    assert speed_columns(result)["parked"].tolist() == [0] * 4 + [1] * 3
+    columns = left_out_columns(result)
+    assert columns["track_id"].tolist() == [99]
+    assert columns["reason"].tolist() == ["too little of it is on the road"]
 
 
 def test_a_road_without_vehicles_has_a_page_too() -> None:
