@@ -124,6 +124,7 @@ struct History {
     std::int64_t track_id = 0;
     Called called;
     double last_seen = -std::numeric_limits<double>::infinity();  // before the first entry (s)
+    bool given_out = false;                                       // whether it has rows that are final
     std::vector<Entry> entries;
 };
 
@@ -155,11 +156,12 @@ public:
         end(std::vector<std::uint8_t>(living_.size(), 0), gaps, c);
     }
 
-    // Give out what has become final while tracks live on.
+    // Give out what has become final while tracks live on. Tracks that began together begin to be given out one after
+    // the other, within a lag: a step does not smooth all of them.
     void advance(double now, const GapCounts& gaps, const ModelConstants& c) {
         if (!std::isfinite(lag_s_)) return;
         for (History& history : living_)
-            if (!history.entries.empty() && history.entries.front().t < now - 2.0 * lag_s_)
+            if (!history.entries.empty() && history.entries.front().t < now - (1.0 + share_of(history)) * lag_s_)
                 give_out(history, now - lag_s_, gaps, c, rows_, true);
     }
 
@@ -186,6 +188,14 @@ public:
     }
 
 private:
+    // Which share of the second lag a track waits for: of the first window as its identity says, then all of it.
+    static double share_of(const History& history) {
+        constexpr double kGolden = 0.6180339887498949;
+        if (history.given_out) return 1.0;
+        const double turns = kGolden * static_cast<double>(history.track_id & 0xffff);
+        return turns - std::floor(turns);
+    }
+
     // Whether a step is the one behind the last that was taken in.
     void check_order(const Record& record) const {
         bool fits = living_.size() <= record.track_id.size();
@@ -242,6 +252,7 @@ private:
         }
         if (!forget) return;
         history.last_seen = last_seen;
+        history.given_out = true;
         entries.erase(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(given));
     }
 

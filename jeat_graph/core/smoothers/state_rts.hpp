@@ -12,17 +12,20 @@ using filters::kMatrix;
 using filters::kStates;
 using filters::Matrix;
 
-// Cholesky factor of a symmetric positive definite matrix, in place (lower part).
+// Rows of matrices are this long, so that loops over them become vectors.
+inline constexpr int kRow = kStates + 1;
+
+// Cholesky factor of a symmetric positive definite matrix, in place (lower part); its diagonal is inverted.
 inline void cholesky(double* a) {
     for (int j = 0; j < kStates; ++j) {
         double d = a[j * kStates + j];
         for (int k = 0; k < j; ++k) d -= a[j * kStates + k] * a[j * kStates + k];
-        d = std::sqrt(std::max(d, 1e-300));
-        a[j * kStates + j] = d;
+        const double inverse = 1.0 / std::sqrt(std::max(d, 1e-300));
+        a[j * kStates + j] = inverse;
         for (int i = j + 1; i < kStates; ++i) {
             double s = a[i * kStates + j];
             for (int k = 0; k < j; ++k) s -= a[i * kStates + k] * a[j * kStates + k];
-            a[i * kStates + j] = s / d;
+            a[i * kStates + j] = s * inverse;
         }
     }
 }
@@ -31,43 +34,41 @@ inline void cholesky(double* a) {
 inline void rts_axis(double* mean, double* P, const Matrix& F, const double* predicted_mean,
                      const double* predicted_covariance, const double* next_mean, const double* next_covariance) {
     // Solved in a scaled state: variances of position and acceleration differ by orders of magnitude.
-    double scale[kStates], L[kMatrix], G[kMatrix];
-    for (int i = 0; i < kStates; ++i) scale[i] = std::sqrt(predicted_covariance[i * kStates + i]);
+    double scale[kStates], L[kMatrix], Gt[kStates][kRow] = {};
+    for (int i = 0; i < kStates; ++i) scale[i] = 1.0 / std::sqrt(predicted_covariance[i * kStates + i]);
     for (int i = 0; i < kStates; ++i)
-        for (int j = 0; j < kStates; ++j)
-            L[i * kStates + j] = predicted_covariance[i * kStates + j] / (scale[i] * scale[j]);
+        for (int j = 0; j <= i; ++j) L[i * kStates + j] = predicted_covariance[i * kStates + j] * (scale[i] * scale[j]);
     cholesky(L);
-    for (int column = 0; column < kStates; ++column) {
-        double x[kStates];
-        for (int i = 0; i < kStates; ++i) {
-            double s = 0.0;
-            for (int k = i; k < kStates; ++k) s += F[i * kStates + k] * P[k * kStates + column];
-            x[i] = s / scale[i];
-        }
-        for (int i = 0; i < kStates; ++i) {
-            for (int k = 0; k < i; ++k) x[i] -= L[i * kStates + k] * x[k];
-            x[i] /= L[i * kStates + i];
-        }
-        for (int i = kStates - 1; i >= 0; --i) {
-            for (int k = i + 1; k < kStates; ++k) x[i] -= L[k * kStates + i] * x[k];
-            x[i] /= L[i * kStates + i];
-        }
-        for (int i = 0; i < kStates; ++i) G[column * kStates + i] = x[i] / scale[i];
+    // G' = P-^-1 F P, all of its columns at once.
+    for (int i = 0; i < kStates; ++i) {
+        for (int k = filters::kDriven[i][0]; k <= filters::kDriven[i][1]; ++k)
+            for (int j = 0; j < kStates; ++j) Gt[i][j] += F[i * kStates + k] * P[k * kStates + j];
+        for (int j = 0; j < kRow; ++j) Gt[i][j] *= scale[i];
+        for (int k = 0; k < i; ++k)
+            for (int j = 0; j < kRow; ++j) Gt[i][j] -= L[i * kStates + k] * Gt[k][j];
+        for (int j = 0; j < kRow; ++j) Gt[i][j] *= L[i * kStates + i];
     }
-    double D[kMatrix], GD[kMatrix] = {};
-    for (int k = 0; k < kMatrix; ++k) D[k] = next_covariance[k] - predicted_covariance[k];
+    for (int i = kStates - 1; i >= 0; --i) {
+        for (int k = i + 1; k < kStates; ++k)
+            for (int j = 0; j < kRow; ++j) Gt[i][j] -= L[k * kStates + i] * Gt[k][j];
+        for (int j = 0; j < kRow; ++j) Gt[i][j] *= L[i * kStates + i];
+    }
     for (int i = 0; i < kStates; ++i)
-        for (int k = 0; k < kStates; ++k) {
-            mean[i] += G[i * kStates + k] * (next_mean[k] - predicted_mean[k]);
-            for (int j = 0; j < kStates; ++j) GD[i * kStates + j] += G[i * kStates + k] * D[k * kStates + j];
-        }
-    for (int i = 0; i < kStates; ++i)
-        for (int j = i; j < kStates; ++j) {
-            double s = 0.0;
-            for (int k = 0; k < kStates; ++k) s += GD[i * kStates + k] * G[j * kStates + k];
-            const double v = (P[i * kStates + j] + P[j * kStates + i]) / 2.0 + s;
-            P[i * kStates + j] = P[j * kStates + i] = v;
-        }
+        for (int j = 0; j < kRow; ++j) Gt[i][j] *= scale[i];
+    double D[kStates][kRow] = {};
+    for (int k = 0; k < kStates; ++k) {
+        const double moved = next_mean[k] - predicted_mean[k];
+        for (int i = 0; i < kStates; ++i) mean[i] += Gt[k][i] * moved;
+        for (int j = 0; j < kStates; ++j) D[k][j] = next_covariance[k * kStates + j] - predicted_covariance[k * kStates + j];
+    }
+    for (int i = 0; i < kStates; ++i) {
+        double GD[kRow] = {}, more[kRow] = {};
+        for (int k = 0; k < kStates; ++k)
+            for (int j = 0; j < kRow; ++j) GD[j] += Gt[k][i] * D[k][j];
+        for (int k = 0; k < kStates; ++k)
+            for (int j = 0; j < kRow; ++j) more[j] += GD[k] * Gt[k][j];
+        for (int j = i; j < kStates; ++j) P[i * kStates + j] = P[j * kStates + i] = P[i * kStates + j] + more[j];
+    }
 }
 
 }  // namespace jeat::smoothers
