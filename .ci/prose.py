@@ -38,8 +38,6 @@ RULES: tuple[tuple[str, str], ...] = (
     (r"\bto be had\b", "available"),
     (r"(?<![\w./)\]-])\.\d", "write the zero: 0.6, not .6"),
 )
-#: Pages that describe the engine before the present one; each leaves this list when it is rewritten.
-NOT_YET = frozenset({"docs/benchmarks/raw.md", "docs/benchmarks/worlds.md"})
 #: Made by the build from the code.
 GENERATED = frozenset({"docs/reference/commands.md", "docs/reference/configuration.md"})
 _CODE = re.compile(r"```.*?```|`[^`\n]*`|\$\$.*?\$\$|\$[^$\n]*\$|\]\([^)]*\)|<!--.*?-->", re.DOTALL)
@@ -50,7 +48,7 @@ def pages() -> Iterator[Path]:
     found = [*ROOT.glob("*.md"), ROOT / "sehn" / "README.md", *(ROOT / "docs").rglob("*.md")]
     for path in sorted(found):
         name = path.relative_to(ROOT).as_posix()
-        if "_build" not in path.parts and name not in NOT_YET | GENERATED:
+        if "_build" not in path.parts and name not in GENERATED:
             yield path
 
 
