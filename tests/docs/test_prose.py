@@ -61,11 +61,6 @@ def test_pages_and_help_have_no_findings():
     assert [line for name, text in (*texts, *prose.helps()) for line in prose.findings(name, text)] == []
 
 
-def test_pages_that_wait_exist_and_still_need_it():
-    for name in prose.NOT_YET:
-        assert (ROOT / name).is_file(), f"{name} is gone: take it off the list"
-
-
 def test_the_glossary_has_at_most_sixty_terms_each_once():
     names = [line.split("|")[1].strip() for line in TERMS]
     assert 30 <= len(names) <= 60
