@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -103,8 +104,11 @@ def _lanes(result: RoadResult, config: SummaryConfig) -> str:
 
 
 def _by_lane(result: RoadResult) -> list[tuple[str, list[Speed]]]:
+    """Return the speeds that are known, by lane; those of no lane come last."""
     groups: dict[str, list[Speed]] = {}
     for lane, speed in zip(result.lane_names, result.speeds, strict=True):
+        if not math.isfinite(speed.kmh):
+            continue
         groups.setdefault(lane, []).append(speed)
     known = [name for name in result.lanes.names if name in groups]
     return [(name, groups[name]) for name in [*known, *([""] if "" in groups else [])]]

@@ -17,7 +17,7 @@ from jeat_graph.road.motion_fit import MotionFit
 from jeat_graph.road.points_road import summarise
 from jeat_graph.road.results import LeftOut, RoadResult, Size, left_out_columns, speed_columns
 from jeat_graph.road.road_page import render_road_page
-from jeat_graph.road.speeds import ContactConfig, Speed, Vehicle, interval
+from jeat_graph.road.speeds import UNKNOWN_SPEED, ContactConfig, Speed, Vehicle, interval
 from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns, speed_summary
 
 LENGTH = 4.0
@@ -170,6 +170,24 @@ def test_who_stands_all_the_time_is_parked_and_shows_no_lane() -> None:
     columns = left_out_columns(result)
     assert columns["track_id"].tolist() == [99]
     assert columns["reason"].tolist() == ["too little of it is on the road"]
+
+
+def test_speeds_that_are_not_known_are_left_out_of_the_page_and_the_means() -> None:
+    known = _result()
+    speeds = [*known.speeds[:-1], UNKNOWN_SPEED]
+    crossings = [
+        (line, k, one._replace(speed=UNKNOWN_SPEED) if k == 5 else one) for line, k, one in known.crossings
+    ]
+    result = replace(known, speeds=speeds, crossings=crossings)
+    page = render_road_page(result, camera(), SummaryConfig(), "one unknown")
+    assert "nan" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL).lower().split()
+    columns = count_columns(result, SummaryConfig(interval_s=300.0))
+    whole = (columns["lane"] == "all") & (columns["class"] == "all")
+    assert columns["count"][whole].tolist() == [6]
+    assert np.isfinite(columns["mean_kmh"][whole]).all()
+    none = replace(result, speeds=[UNKNOWN_SPEED] * 6)
+    assert "Speeds by lane" in render_road_page(none, camera(), SummaryConfig(), "none known")
+    assert np.isfinite(headway_columns(result, SummaryConfig())["headway_s"]).all()
 
 
 def test_a_road_without_vehicles_has_a_page_too() -> None:
