@@ -110,8 +110,8 @@ def test_whole_tracks_are_smoothed_as_by_the_reference(seed):
     # How gaps end is known as of a track's end in the one, and as of the very end in the other: they may
     # differ in the rows that no sensor saw.
     seen_ours, seen_theirs = ([column[rows[5] != 0] for column in rows] for rows in (ours, theirs))
-    # A pass backwards solves with covariances whose condition is 1e10 and more after long gaps, and each subtracts
-    # what is nearly equal in an order of its own: of a variance three digits are sure (1.1e-4 has been seen).
+    # A pass backwards solves with covariances whose condition is 1e10 and more after long gaps, and each
+    # subtracts what is nearly equal in an order of its own: of a variance three digits are sure.
     assert_alike(seen_ours, seen_theirs, "smoothed", atol=1e-3)
 
 
