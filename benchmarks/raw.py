@@ -9,8 +9,6 @@ from pathlib import Path
 from statistics import stdev
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from benchmarks import common
 from benchmarks.baselines import peers_here
 from benchmarks.judging import METRICS, in_processes
@@ -19,7 +17,6 @@ from benchmarks.raw_options import add_raw, detectors_of, findings
 from benchmarks.raw_segments import SENSORS, RawFound, RawSegment, described, find_in, segments_in
 from benchmarks.recordings import JudgedRecording
 from jeat_graph.config.reading import load_config
-from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.declared import declared_settings
@@ -226,21 +223,13 @@ def _scores(group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, ki
     from jeat_graph.eval.metrics import evaluate
 
     first = row.sensors[:1] if row.tracker == BYTETRACK else row.sensors
-    instants = [_instants(one, first, row) for one in group] if kind == CAUSAL else None
+    # Ours says itself when it ran: what detectors need was taken off their times beforehand.
+    ran = [table.instants for table in found]
+    at = [one.instants(first) for one in group] if row.tracker == BYTETRACK else ran
+    instants = at if kind == CAUSAL else None
     pairs = [(one.truth, table) for one, table in zip(group, found, strict=True)]
     joined_s = _joined_s(group, row.sensors) if kind == SMOOTHED else None
     return evaluate(pairs, kind=kind, instants=instants, max_gap_s=joined_s).as_dict()
-
-
-def _instants(recording: JudgedRecording, sensors: Sequence[str], row: Row) -> FloatArray:
-    """Times at which a tracker had something to say: ours takes off what detectors need beforehand."""
-    from jeat_graph.runs.latency import at_measurement
-
-    if row.tracker == BYTETRACK:
-        return recording.instants(sensors)
-    seen = recording.only(sensors)
-    times: FloatArray = np.unique(at_measurement(seen, _config(row, seen, recording.image)).scan_t)
-    return times
 
 
 def _joined_s(group: Sequence[JudgedRecording], sensors: Sequence[str]) -> float | None:

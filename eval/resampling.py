@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 
@@ -173,13 +173,18 @@ def on_the_clock_of(table: Trajectories, times: FloatArray) -> bool:
     return bool(apart.all() and np.median(np.diff(own)) < 1.5 * frame_s)
 
 
+def _among(t: FloatArray, moments: FloatArray) -> BoolArray:
+    """Return which times (N,) are some of others, ascending and at least one."""
+    place = np.searchsorted(moments, t - TIME_TOLERANCE_S)
+    return np.asarray(np.abs(moments[np.minimum(place, len(moments) - 1)] - t) <= TIME_TOLERANCE_S)
+
+
 def _rows_at_each(t: FloatArray, track_id: IntArray, instants: FloatArray) -> bool:
     """Whether rows of tracks (N,) lie at the tracker's times, mostly one step from one to the next."""
     ticks = np.unique(instants)
-    place = np.searchsorted(ticks, t - TIME_TOLERANCE_S)
-    if (np.abs(ticks[np.minimum(place, len(ticks) - 1)] - t) > TIME_TOLERANCE_S).any():
+    if not _among(t, ticks).all():
         return False
-    steps = np.diff(place)[np.diff(track_id) == 0]
+    steps = np.diff(np.searchsorted(ticks, t - TIME_TOLERANCE_S))[np.diff(track_id) == 0]
     return bool(len(steps)) and float(np.median(steps)) == 1.0
 
 
@@ -225,12 +230,14 @@ def interpolate_to(
     order = np.lexsort((table.t, table.track_id))
     t = table.t[order]
     moments, at_each = np.unique(t), False
-    if instants is not None and len(t):
-        at_each = _rows_at_each(t, table.track_id[order], instants)
-        near = np.searchsorted(moments, instants - TIME_TOLERANCE_S)
-        other = moments[np.minimum(near, len(moments) - 1)] - instants
-        if at_each:
-            moments = np.unique(np.concatenate((moments, instants[np.abs(other) > TIME_TOLERANCE_S])))
+    if (
+        instants is not None
+        and len(instants)
+        and len(t)
+        and _rows_at_each(t, table.track_id[order], instants)
+    ):
+        at_each = True
+        moments = np.unique(np.concatenate((moments, instants[~_among(instants, moments)])))
     _, first, count = np.unique(table.track_id[order], return_index=True, return_counts=True)
     begin = np.searchsorted(times, t[first] - TIME_TOLERANCE_S, side="left")
     end = np.searchsorted(times, t[first + count - 1] + TIME_TOLERANCE_S, side="right")

@@ -15,7 +15,7 @@ from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.cuboid_fit import CuboidConfig, CuboidFit, begin, fit_cuboid
 from jeat_graph.road.fleet import CLASSES
 from jeat_graph.road.motion_fit import MotionFitConfig
-from jeat_graph.road.results import LeftOut, Size
+from jeat_graph.road.results import TOO_LITTLE, LeftOut, Size
 from jeat_graph.road.speeds import Vehicle
 
 #: Boxes tell accelerations better than a single tracked point does, so the motion may be less stiff.
@@ -117,7 +117,7 @@ def follow_boxes(
             found.append(SizedVehicle(vehicle, size, class_by_length(fit), fit.chi2))
         else:
             begun = begin(one.rows, camera, config, motion) is not None
-            reason = "no vehicle makes such boxes" if begun else "too little of it is on the road"
+            reason = "no vehicle makes such boxes" if begun else TOO_LITTLE
             left_out.append(LeftOut(one.track_id, float(one.t[0]), float(one.t[-1]), reason))
         if progress is not None:
             progress(k + 1, len(tracks))

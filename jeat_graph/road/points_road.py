@@ -13,7 +13,7 @@ from jeat_graph.road.crossings import crossing, road_line
 from jeat_graph.road.inputs import PointTable, RoadMarks
 from jeat_graph.road.lanes import LaneConfig, find_lanes, given_lanes
 from jeat_graph.road.motion_fit import MotionFitConfig
-from jeat_graph.road.results import NO_SIZE, LeftOut, RoadResult
+from jeat_graph.road.results import NO_SIZE, TOO_LITTLE, LeftOut, RoadResult
 from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle, told
 
 
@@ -36,7 +36,7 @@ def follow_points(
         if one is not None:
             vehicles.append(one)
         else:
-            left_out.append(LeftOut(track_id, float(t[0]), float(t[-1]), "too little of it is on the road"))
+            left_out.append(LeftOut(track_id, float(t[0]), float(t[-1]), TOO_LITTLE))
         if progress is not None:
             progress(k + 1, len(tracks))
     return vehicles, left_out
@@ -92,8 +92,10 @@ def summarise(
     middle = np.array([v.fit.at(t)[0] for v, t in zip(vehicles, when, strict=True)], dtype=np.float64)
     velocity = np.array([v.fit.at(t, 1) for v, t in zip(vehicles, when, strict=True)]).reshape(-1, 2)
     parked = np.array([is_parked(vehicle) for vehicle in vehicles], dtype=np.bool_)
-    found_lanes = find_lanes(middle[~parked], velocity[~parked], lane_config)
-    lanes = given_lanes(marks.lanes) if marks.lanes else found_lanes
+    drive = ~parked
+    lanes = (
+        given_lanes(marks.lanes) if marks.lanes else find_lanes(middle[drive], velocity[drive], lane_config)
+    )
     ends = {name: road_line(camera, line, contact.height_m) for name, line in marks.lines.items()}
     if not ends and vehicles:
         ends = {MIDDLE: _middle_line(vehicles)}

@@ -48,6 +48,8 @@ class LeftOut(NamedTuple):
     reason: str
 
 
+#: Reason of a track of which too little can be placed.
+TOO_LITTLE = "too little of it is on the road"
 NO_SIZE = Size((np.nan,) * 3, (np.nan,) * 3)
 
 

@@ -21,7 +21,7 @@ def both_tables(config: Config, detections: Detections) -> tuple[Trajectories, T
         detections: the recording.
     """
     tracker = Tracker(replace(config, smoother=replace(config.smoother, engine="rts")))
-    causal = [table for table in tracker.run(detections) if len(table)]
+    causal = list(tracker.run(detections))
     smoothed = tracker.finish()
     return Trajectories.concatenate(causal or [Trajectories.empty(tracker.sensor_names)]), smoothed
 

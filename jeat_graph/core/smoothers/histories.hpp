@@ -124,7 +124,6 @@ struct History {
     std::int64_t track_id = 0;
     Called called;
     double last_seen = -std::numeric_limits<double>::infinity();  // before the first entry (s)
-    bool given_out = false;                                       // whether it has rows that are final
     std::vector<Entry> entries;
 };
 
@@ -191,7 +190,7 @@ private:
     // Which share of the second lag a track waits for: of the first window as its identity says, then all of it.
     static double share_of(const History& history) {
         constexpr double kGolden = 0.6180339887498949;
-        if (history.given_out) return 1.0;
+        if (std::isfinite(history.last_seen)) return 1.0;  // its first rows are out
         const double turns = kGolden * static_cast<double>(history.track_id & 0xffff);
         return turns - std::floor(turns);
     }
@@ -252,7 +251,6 @@ private:
         }
         if (!forget) return;
         history.last_seen = last_seen;
-        history.given_out = true;
         entries.erase(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(given));
     }
 

@@ -273,15 +273,14 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     std::vector<History>& living = histories.living();
     std::vector<std::int64_t> track_id, given, label, counts;
     std::vector<double> share, last_seen;
-    std::vector<std::uint8_t> given_out;
     EntryColumns columns;
     std::size_t expected = 0;
     for (const History& history : living) expected += history.entries.size();
     columns.reserve(expected);
     for (History& history : living) {
-        auto& [id, called, seen, begun, entries] = history;
+        auto& [id, called, seen, entries] = history;
         track_id.push_back(id), given.push_back(called.track_id), label.push_back(called.label);
-        share.push_back(called.share), last_seen.push_back(seen), given_out.push_back(begun);
+        share.push_back(called.share), last_seen.push_back(seen);
         counts.push_back(static_cast<std::int64_t>(entries.size()));
         for (Entry& entry : entries) columns.add(entry);
     }
@@ -294,7 +293,6 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     v.column("histories.counts", counts, tracks, 1);
     v.column("histories.share", share, tracks, 1, Values::any);
     v.column("histories.last_seen", last_seen, tracks, 1, Values::any);
-    v.column("histories.given_out", given_out, tracks, 1);
     v.column("histories.t", columns.t, total, 1);
     v.column("histories.dt", columns.dt, total, 1);
     v.column("histories.real", columns.real, total, 1);
@@ -315,7 +313,6 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
             history.track_id = track_id[i];
             history.called = {given[i], label[i], share[i]};
             history.last_seen = last_seen[i];
-            history.given_out = given_out[i] != 0;
             for (std::size_t k = 0; k < count; ++k) history.entries.push_back(columns.at(at + k));
             at += count;
         }
