@@ -48,6 +48,16 @@ class DetectionViews:
         """Return a data frame with the columns of `detections.csv`: one row a detection or empty scan."""
         import pandas as pd
 
+        columns = self.columns()
+        if "embedding" in columns:
+            columns["embedding"] = list(columns["embedding"])
+        return pd.DataFrame(columns)
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of `detections.csv` by name, one row a detection or empty scan.
+
+        Embeddings, if there are any, are one array (N, E).
+        """
         t, sensor, boxes, scores, _, classes = self.to_rows()
         columns: dict[str, Any] = {"t": t, "sensor": sensor}
         columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
@@ -56,8 +66,8 @@ class DetectionViews:
             columns["class"] = classes
         looks = self.embedding_rows()
         if looks is not None:
-            columns["embedding"] = list(looks)
-        return pd.DataFrame(columns)
+            columns["embedding"] = looks
+        return columns
 
     @classmethod
     def from_pandas(

@@ -178,17 +178,9 @@ def write_detections(detections: Detections, path: str | Path, decimals: int | N
         path: the file; it appears only when it is complete.
         decimals: decimals (px) to which boxes are rounded; by default every number is kept to the last bit.
     """
-    t, sensor, boxes, scores, _, classes = detections.to_rows()
+    columns = detections.columns()
     if decimals is not None:
-        boxes = round_decimals(boxes, decimals)
-    columns: dict[str, Any] = {"t": t, "sensor": sensor}
-    columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
-    columns["score"] = scores
-    if detections.classes is not None:
-        columns["class"] = classes
-    looks = detections.embedding_rows()
-    if looks is not None:
-        columns["embedding"] = looks
+        columns |= {name: round_decimals(columns[name], decimals) for name in BOX}
     write_columns(columns, path)
 
 
