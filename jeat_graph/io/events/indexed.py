@@ -14,6 +14,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.io.events.dat import DatReader
@@ -22,6 +23,7 @@ from jeat_graph.io.events.raw_header import origin_of, read_raw_header
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _WORD = np.dtype("<u8")
+_VERSIONS = ("0", "1", "2")
 _TIME_BITS = np.uint64(0xFFFFFFFF)
 #: Words that are looked at for a clock that begins again, evenly chosen.
 _LOOKS = 1000
@@ -37,15 +39,9 @@ class SearchedFile(EventFile):
         DataError: no such file, no HDF5, or a data set that is missing or of a wrong type or length.
     """
 
-    def rows(self, first: int, end: int, labels: bool = True) -> EventArray:
-        """Read events by number, from `first` to before `end`; what caused them is left out."""
-        read = {name: self._read(self._events[name], slice(first, end)) for name in ("t", "x", "y", "p")}
-        return EventArray(
-            np.maximum.accumulate(read["t"].astype(np.int64)),
-            read["x"].astype(np.uint16),
-            read["y"].astype(np.uint16),
-            (read["p"] > 0).astype(np.uint8),
-        )
+    def _ordered(self, t_us: IntArray) -> IntArray:
+        """Return times that run on: what is earlier than one before has that one's time."""
+        return np.asarray(np.maximum.accumulate(t_us))
 
 
 class DatFile:
@@ -69,7 +65,10 @@ class DatFile:
         with self.path.open("rb") as file:
             header = read_raw_header(file, self.path)
             self._header_bytes = file.tell() + 2
-            self._version = int(header.keys.get("version", "2").strip() or 2)
+            version = header.keys.get("version", "2").strip()
+            if version not in _VERSIONS:
+                raise DataError(f"is DAT of version {version!r}; 1 and 2 are read", self.path)
+            self._version = int(version)
             # The reader checks the two bytes that announce the events.
             DatReader(self.path, file, header.size_px, self._version)
         self.size_px = header.size_px
@@ -107,8 +106,8 @@ class DatFile:
         reader = DatReader(self.path, file, self.size_px, self._version)
         return EventArray.concatenate(list(reader.pieces())).between(start_us, end_us)
 
-    def _times(self, rows: Any) -> npt.NDArray[np.int64]:
-        return (self._words[rows] & _TIME_BITS).astype(np.int64)
+    def _times(self, rows: Any) -> IntArray:
+        return np.asarray(self._words[rows] & _TIME_BITS, dtype=np.int64)
 
     def _first_at(self, t_us: int) -> int:
         """Return the number of the first event at or after a time, by halving."""

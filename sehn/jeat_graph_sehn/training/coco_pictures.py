@@ -40,7 +40,9 @@ def read_coco_pictures(
     names = {int(c["id"]): str(c.get("name", c["id"])) for c in _list(tree, "categories", path) if "id" in c}
     wanted, _ = wanted_classes((), len(names) or None, names)
     rows: dict[int, list[tuple[list[float], bool, int]]] = {}
-    for k, entry in enumerate(_list(tree, "annotations", path)):
+    marks = _list(tree, "annotations", path)
+    for k, entry in enumerate(marks):
+        on_read(f"{path.name}: {k} of {len(marks)} annotations")
         try:
             box = [float(value) for value in entry["bbox"]]
             image, category = int(entry["image_id"]), int(entry.get("category_id", 0))

@@ -22,6 +22,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -45,6 +46,8 @@ _BOXES, _PLAIN = "_bbox.npy", ".npy"
 _EVENTS = (".dat", ".h5", ".dat.h5", ".hdf5", ".raw")
 _MIDDLES = ("_td", "")
 _PART = re.compile(r"^(train|val|test)")
+#: How the name ends of what a recording was converted to.
+_CONVERTED = re.compile(r"-[0-9a-f]{12}\.h5$")
 _LABEL_MAP = "label_map_dictionary.json"
 _CLASSES: dict[str, tuple[str, ...]] = {
     "gen1": ("car", "pedestrian"),
@@ -139,6 +142,15 @@ def read_labelled_segments(
     if not found:
         raise DataError("holds no labels at all in its arrays of boxes", root)
     return found
+
+
+def forget_converted(cache: Path) -> None:
+    """Remove what recordings were converted to, and the folder if nothing else is in it."""
+    for path in cache.glob("*.h5"):
+        if _CONVERTED.search(path.name):
+            path.unlink()
+    with suppress(OSError):  # not there, or not empty
+        cache.rmdir()
 
 
 def _recordings(root: Path) -> Iterator[_Recording]:

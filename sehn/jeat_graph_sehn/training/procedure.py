@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -31,7 +30,12 @@ from jeat_graph_sehn.training.data_sets import (
 )
 from jeat_graph_sehn.training.export import write_onnx
 from jeat_graph_sehn.training.judging import Precision, judge
-from jeat_graph_sehn.training.labelled_sets import described_labels, holds_labels, read_labelled_segments
+from jeat_graph_sehn.training.labelled_sets import (
+    described_labels,
+    forget_converted,
+    holds_labels,
+    read_labelled_segments,
+)
 from jeat_graph_sehn.training.log_files import draw_log, write_log
 from jeat_graph_sehn.training.making import looks_twice, settings_of
 from jeat_graph_sehn.training.quantising import MOST_LOOKS, write_int8
@@ -146,10 +150,13 @@ def train(
         to_go.tell(share, trainer.words())
         on_progress(share, words)
 
-    def looked(done: int, of: int) -> None:
-        telling.tell(f"{trainer.words()}; judging, {done} of {of} {unit}")
+    def looked_on_the_way(done: int, of: int) -> None:
+        to_go.tell(trainer.progress, f"{trainer.words()}, judging {done} of {of} {unit}")
 
-    trainer.run(step_done, looked)
+    def looked(done: int, of: int) -> None:
+        telling.tell(f"judging {done} of {of} {unit}")
+
+    trainer.run(step_done, looked_on_the_way)
     card = {**about, "parameters": count, "steps": trainer.step, "split": split.note}
     say(f"judging by {len(split.judged)} {unit}")
     card["judged"] = _table(judge(trainer.average, split.judged, side, request.settings, _ALL, looked))
@@ -161,7 +168,7 @@ def train(
     draw_log(trainer.log, plot)
     write_onnx(trainer.average, side, card, request.out, second_look=request.settings.second_look)
     checkpoint.unlink(missing_ok=True)
-    shutil.rmtree(_cache(request), ignore_errors=True)
+    forget_converted(_cache(request))
     return Trained((request.out, log, plot), card)
 
 
@@ -192,7 +199,9 @@ def bring_to_int8(source: Path, request: TrainRequest, say: Callable[[str], obje
     say(f"looks at {MOST_LOOKS} {unit} at most, of {len(split.learned)}, then writes")
     with tempfile.TemporaryDirectory() as folder:
         sized = resized(source, side, Path(folder) / source.name, twice)
-        return write_int8(sized, split.learned, about, request.out)
+        looks = write_int8(sized, split.learned, about, request.out)
+    forget_converted(_cache(request))
+    return looks
 
 
 def _check_fused(request: TrainRequest) -> None:

@@ -10,7 +10,7 @@ import pytest
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph_sehn.training.data_sets import split_by_segment
 from jeat_graph_sehn.training.label_times import UNKNOWN
-from jeat_graph_sehn.training.labelled_sets import holds_labels, read_labelled_segments
+from jeat_graph_sehn.training.labelled_sets import forget_converted, holds_labels, read_labelled_segments
 from jeat_graph_sehn.training.settings import LabelSettings
 
 from .labelled_fixtures import END_S, LABEL_S, SIZE, boxes, car_at, events, write_events, write_recording
@@ -201,6 +201,22 @@ def test_what_is_damaged_is_named(tmp_path, spoil, said):
     spoil(tmp_path)
     with pytest.raises(DataError, match=said):
         read(tmp_path)
+
+
+def test_only_what_was_converted_is_removed(tmp_path):
+    cache = tmp_path / "net.events"
+    write_recording(tmp_path / "set", "one", ".raw")
+    read(tmp_path / "set", cache=cache)
+    (made,) = cache.iterdir()
+    before = made.stat().st_mtime_ns
+    read(tmp_path / "set", cache=cache)
+    assert made.stat().st_mtime_ns == before  # a second time it is there
+    (cache / "mine.h5").write_text("")
+    forget_converted(cache)
+    assert [path.name for path in cache.iterdir()] == ["mine.h5"]
+    (cache / "mine.h5").unlink()
+    forget_converted(cache)
+    assert not cache.exists()
 
 
 @pytest.mark.usefixtures("no_plot")

@@ -66,4 +66,5 @@ def test_a_training_says_sizes_steps_and_the_time_to_go(small_set, tmp_path, mon
     goal = "trains for 3 steps (0.5 epochs)" if minutes is None else "trains for 0.03 min"
     assert f"{goal}, 2 cut-outs of 32 x 32 px a step" in told
     assert any(line.startswith("step 1") and line.endswith("to go") for line in said)
-    assert any("judging, 1 of 2 pictures" in line for line in said)
+    assert any("judging 1 of 2 pictures; about" in line for line in said)
+    assert "judging 2 of 12 pictures" in told
