@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.cli.count_output import clock_s, station_columns, with_clock
+from jeat_graph.cli.count_output import (
+    PublicationOptions,
+    clock_s,
+    station_columns,
+    with_clock,
+    write_publication,
+)
 from jeat_graph.cli.options import add_classes, add_tables, tables_read
 from jeat_graph.cli.place_options import add_places, places
 from jeat_graph.cli.terminal import say
@@ -23,8 +29,9 @@ from jeat_graph.eval.counting import Count, Line, LineCrossing
 if TYPE_CHECKING:
     from jeat_graph.data.arrays import FloatArray
     from jeat_graph.data.trajectories import Trajectories
+    from jeat_graph.eval.stations import StationRecord
 
-WRITES = ("out", "od", "stations", "crossings")
+WRITES = ("out", "od", "stations", "datex", "crossings")
 HELP = "count vehicles over lines and zones in the picture, by direction, class and interval"
 
 
@@ -59,7 +66,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="also write flow, occupancy, headway and speed of each line and interval, as CSV",
     )
-    add("--road", metavar="DIR", help="what `road` wrote with the same lines: lanes and speeds of --stations")
+    add(
+        "--datex",
+        metavar="FILE.xml",
+        help="also write these as measured data of DATEX II v3; needs --begin with a time zone, and "
+        "--publisher, say --begin 2026-11-27T07:30:00+01:00 --publisher DE:city-of-bonn",
+    )
+    add("--publisher", metavar="CC:NAME", help="who publishes: two letters of the country, and a name")
+    add(
+        "--publication-time",
+        metavar="DATE",
+        help="when (default: the end of the recording), with a time zone",
+    )
+    add("--site-table", metavar="ID", default="jeat-graph", help="the table that has the sites (%(default)s)")
+    add("--road", metavar="DIR", help="what `road` wrote with the same lines: lanes and speeds of stations")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -74,8 +94,9 @@ def run(args: argparse.Namespace) -> int:
     if not lines and not zones:
         raise ConfigError("nothing to count at: give --line, --zone or --lines FILE.yaml")
     names = [line.name for line in lines] + [zone.name for zone in zones]
-    if args.road is not None and args.stations is None:
+    if args.road is not None and args.stations is None and args.datex is None:
         raise ConfigError("--road says nothing without --stations: give both, or leave it out")
+    publication = _publication(args)
     later_s = clock_s(args.begin)
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
@@ -100,8 +121,12 @@ def run(args: argparse.Namespace) -> int:
         write_columns(with_clock(_columns(found, LineCrossing), args.begin), args.crossings)
     if args.od:
         _write_od(found, edges, names, args)
-    if args.stations:
-        _write_stations(table, lines, at_lines, edges, span, later_s, args)
+    if args.stations or publication is not None:
+        records = _stations(table, lines, at_lines, edges, span, later_s, args.road)
+        if args.stations:
+            write_columns(with_clock(station_columns(records), args.begin), args.stations)
+        if publication is not None:
+            write_publication(records, span[1], publication, args.datex)
     if args.out:
         write_columns(with_clock(_columns(counts, Count), args.begin), args.out)
         print(f"wrote {args.out}: {len(found)} crossings ({kind} tracks)", file=sys.stderr)
@@ -132,27 +157,39 @@ def _write_od(
     write_columns(with_clock(_columns(rows, OdCount), args.begin), args.od)
 
 
-def _write_stations(
+def _publication(args: argparse.Namespace) -> PublicationOptions | None:
+    """Return what is said of the publication in DATEX II, or None if none is asked for.
+
+    Raises:
+        ConfigError: something that it needs is missing, or said without it.
+    """
+    if args.datex is not None:
+        return PublicationOptions(args.begin, args.publisher, args.publication_time, args.site_table)
+    for option in ("publisher", "publication_time"):
+        if getattr(args, option) is not None:
+            raise ConfigError(f"--{option.replace('_', '-')} says nothing without --datex")
+    return None
+
+
+def _stations(
     table: Trajectories,
     lines: list[Line],
     at_lines: list[LineCrossing],
     edges: FloatArray,
     span: tuple[float, float],
     later_s: float,
-    args: argparse.Namespace,
-) -> None:
+    road: str | None,
+) -> list[StationRecord]:
     from jeat_graph.cli.count_output import on_road
     from jeat_graph.eval.stations import covered_s, stations
-    from jeat_graph.io.tables.table_writer import write_columns
 
     if not lines:
         raise DataError("--stations is of lines: give --line, or --lines FILE.yaml with some")
     by_name = {line.name: line for line in lines}
     covers = [covered_s(table, by_name[c.line], c) for c in at_lines]
-    lanes, speeds = (None, None) if args.road is None else on_road(Path(args.road), at_lines)
+    lanes, speeds = (None, None) if road is None else on_road(Path(road), at_lines)
     later = [replace(c, t=c.t + later_s) for c in at_lines]
-    records = stations(later, covers, list(by_name), edges, span, lanes, speeds)
-    write_columns(with_clock(station_columns(records), args.begin), args.stations)
+    return stations(later, covers, list(by_name), edges, span, lanes, speeds)
 
 
 def _show(counts: list[Count], *, shown: bool) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,10 @@ from jeat_graph.eval.stations import StationRecord
 
 if TYPE_CHECKING:
     from jeat_graph.eval.counting import LineCrossing
+    from jeat_graph.io.exports.datex2 import Publication
 
+#: Two letters of the country, and a name.
+_PUBLISHER = re.compile(r"[A-Za-z]{2}:\S.*")
 Columns = dict[str, npt.NDArray[Any]]
 _CROSSINGS = "crossings.csv"
 #: Columns of times (s) and of the same times on the clock.
@@ -65,6 +69,94 @@ def station_columns(records: Sequence[StationRecord]) -> Columns:
     return columns | {
         f"flow_{kind}": np.array([one.by_class[kind] for one in records], dtype=np.int64) for kind in classes
     }
+
+
+@dataclass(frozen=True)
+class PublicationOptions:
+    """What the user says of a publication in DATEX II.
+
+    Attributes:
+        begin: date and time of the recording's time 0, with a zone.
+        publisher: country and name, `CC:NAME`.
+        time: of the publication, with a zone; None: when the recording ends.
+        table: identifier of the table of measurement sites.
+
+    Raises:
+        ConfigError: names the option that is missing or wrong.
+    """
+
+    begin: str | None
+    publisher: str | None
+    time: str | None
+    table: str
+
+    def __post_init__(self) -> None:
+        if self.begin is None:
+            raise ConfigError("--datex needs the date and time of the recording's time 0: --begin")
+        _date(self.begin)
+        if datetime.fromisoformat(self.begin).tzinfo is None:
+            raise ConfigError(f"--begin {self.begin}: --datex needs a time zone, say {self.begin}+01:00")
+        if self.publisher is None or not _PUBLISHER.fullmatch(self.publisher):
+            raise ConfigError("--datex needs who publishes: --publisher CC:NAME, say DE:city-of-bonn")
+        self.made(0.0)
+
+    def made(self, last_s: float) -> Publication:
+        """Return the publication of a recording that ends at a time of the clock (s since 1970).
+
+        Raises:
+            ConfigError: the time of the publication is none.
+        """
+        from jeat_graph.io.exports.datex2 import Publication
+
+        when = datetime.fromtimestamp(last_s, _date(str(self.begin)).tzinfo)
+        if self.time is not None:
+            when = _zoned(self.time)
+        country, _, name = str(self.publisher).partition(":")
+        return Publication(when, country.upper(), name, self.table)
+
+
+def _zoned(text: str) -> datetime:
+    try:
+        date = datetime.fromisoformat(text)
+    except ValueError:
+        date = datetime.min
+    if date.tzinfo is None:
+        raise ConfigError(
+            f"--publication-time {text}: must be a date and time with a zone, say 2026-11-27T09:00:00Z"
+        )
+    return date
+
+
+def write_publication(
+    records: Sequence[StationRecord], last_s: float, publication: PublicationOptions, path: str | Path
+) -> None:
+    """Write records as DATEX II.
+
+    Args:
+        records: of stations, on the clock.
+        last_s: when the recording ends, on the clock (s since 1970).
+        publication: what the user says of it.
+        path: the file.
+    """
+    from jeat_graph.io.exports.datex2 import SiteInterval, write_datex2
+
+    zone = _date(str(publication.begin)).tzinfo
+    intervals = [
+        SiteInterval(
+            "-".join(part for part in (one.station, one.direction, one.lane) if part),
+            datetime.fromtimestamp(one.t_from, zone),
+            datetime.fromtimestamp(one.t_to, zone),
+            one.observed,
+            one.flow,
+            one.flow_per_hour,
+            one.occupancy,
+            one.headway_s,
+            one.speed_kmh,
+            one.by_class,
+        )
+        for one in records
+    ]
+    write_datex2(intervals, publication.made(last_s), path)
 
 
 def on_road(folder: Path, found: Sequence[LineCrossing]) -> tuple[list[str], list[float]]:

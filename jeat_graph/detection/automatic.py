@@ -1,8 +1,9 @@
 """Chooses what finds vehicles in pictures where nobody says: by a look at the first seconds.
 
-Known networks that are on this machine, and the package's own `sehn`, look at some of the pictures. A box is
-*sound* where something moves in it, or where the network is sure. A network is trusted if most of its boxes
-are sound and it sees some of what moves; of those the one that finds most is taken. Otherwise `motion` is.
+Known networks that are on this machine, and the package's own `sehn`, look at some of the pictures. Of the
+former only those boxes count that are more likely real than not (`even_score`). A box is *sound* where
+something moves in it, or where the network is sure. A network is trusted if most of its boxes are sound and
+it sees some of what moves; of those the one that finds most is taken. Otherwise `motion` is.
 Nothing is fetched.
 """
 
@@ -198,10 +199,12 @@ def _impression(
     seen = moved = 0.0
     for frame, moving in pictures:
         scan = look(frame, 0.0)
-        common = _common(scan.boxes, moving)
-        areas, mass = scan.boxes[:, 2:].prod(axis=1), moving[:, 2:].prod(axis=1)
-        boxes += len(scan)
-        sound += int(((common.sum(axis=1) >= _MOVING * areas) | (scan.scores >= _SURE)).sum())
+        likely = scan.scores >= (look.even_score or 0.0)
+        found, scores = scan.boxes[likely], scan.scores[likely]
+        common = _common(found, moving)
+        areas, mass = found[:, 2:].prod(axis=1), moving[:, 2:].prod(axis=1)
+        boxes += len(found)
+        sound += int(((common.sum(axis=1) >= _MOVING * areas) | (scores >= _SURE)).sum())
         seen += float(np.minimum(common.sum(axis=0), mass).sum())
         moved += float(mass.sum())
     return Impression(

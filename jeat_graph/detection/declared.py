@@ -1,7 +1,8 @@
 """What the tracker is told of a network: a file beside it, which holds what was measured of its boxes.
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
-configuration: `kind`, `even_score`).
+configuration: `rate_hz`, `even_score`). Of a foreign network of pictures without such a file, the layout of
+its outputs tells what its scores mean (`ModelSettings.even_score`).
 """
 
 from __future__ import annotations
@@ -9,15 +10,21 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from jeat_graph.config.section_tree import build, read_tree
 from jeat_graph.config.sensors import SensorConfig
-from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR
+from jeat_graph.detection.models.model_settings import ModelSettings
+from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
+from jeat_graph.detection.models.output_reader import layout_of
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.request import DetectRequest
 
 _SUFFIX = ".tracking.yaml"
+#: Sides of a picture: batch, colours, height, width.
+_PICTURE = 4
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -27,13 +34,13 @@ class _Declared:
 
 
 def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:
-    """Return what files beside the networks say of them, as `key=value` settings of the tracker.
+    """Return what is known of the networks that detect, as `key=value` settings of the tracker.
 
-    A network without such a file, and the detectors without weights, say nothing.
+    Detectors without weights say nothing.
 
     Args:
         request: what detects.
-        say: called with a line for each file that was found.
+        say: called with a line for each network of which something is known.
 
     Raises:
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
@@ -44,15 +51,21 @@ def declared_settings(request: DetectRequest, say: Callable[[str], object] = lam
     }
     if request.detector_fused is not None:
         looking = {FUSED_SENSOR: request.detector_fused}
-    return declared_of({sensor: by for sensor, by in looking.items() if by is not None}, say)
+    networks = {sensor: by for sensor, by in looking.items() if by is not None}
+    return declared_of(networks, say, request.settings.model_frames)
 
 
-def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lambda _: None) -> list[str]:
+def declared_of(
+    detectors: Mapping[str, str],
+    say: Callable[[str], object] = lambda _: None,
+    reading: ModelSettings | None = None,
+) -> list[str]:
     """Return the same of detectors whose boxes come from elsewhere, from a file or a pipe.
 
     Args:
         detectors: by sensor (`rgb`, `evt` or `fused`) what makes its boxes, `motion` or a network.
-        say: called with a line for each file that was found.
+        say: called with a line for each network of which something is known.
+        reading: how a network of pictures is read.
 
     Raises:
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
@@ -64,6 +77,8 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         network = network_file(detector, _KINDS[sensor])
         beside = network.with_name(network.name.removesuffix(network.suffix) + _SUFFIX)
         if not beside.is_file():
+            if _KINDS[sensor] == FRAMES:
+                found += _by_layout(sensor, network, reading or ModelSettings(), say)
             continue
         tree = read_tree(str(beside), (), str, "file of what a network's boxes are like")
         try:
@@ -73,3 +88,24 @@ def declared_of(detectors: Mapping[str, str], say: Callable[[str], object] = lam
         found.append(f"sensors.{sensor}={json.dumps(tree.get('sensor', {}))}")
         say(f"sensor {sensor!r}: its boxes are taken for what {beside.name} says (any other --config: not)")
     return found
+
+
+def _by_layout(sensor: str, network: Path, reading: ModelSettings, say: Callable[[str], object]) -> list[str]:
+    """Return what scores of a foreign network of pictures mean; nothing where that is not known."""
+    try:
+        head = read_onnx_head(network)
+        if CARD in head.notes:
+            return []
+        picture = next((port.shape for port in head.inputs if len(port.shape) == _PICTURE), None)
+        height, width = (None, None) if picture is None else picture[2:]
+        open_width, open_height = reading.open_side
+        side = (width or open_width, height or open_height)
+        layout = layout_of(head.outputs, side, head.notes, reading.layout, network)
+    except DataError:  # who detects says what is wrong with it
+        return []
+    even = reading.even_score(layout)
+    say(
+        f"sensor {sensor!r}: a box of score {even:g} is taken to be as likely real as not, as of the layout "
+        f"{layout} (--set sensors.{sensor}.even_score=… says otherwise; any other --config: not)"
+    )
+    return [f"sensors.{sensor}={json.dumps({'even_score': even})}"]

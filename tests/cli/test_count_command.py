@@ -197,6 +197,29 @@ def test_lanes_and_speeds_come_from_what_road_wrote(run, tmp_path):
     assert rows.flow.tolist() == [1, 1]
 
 
+DATEX = ["--begin", "2026-11-27T07:30:00+01:00", "--publisher", "de:city-of-bonn", "--datex", "d.xml"]
+
+
+def test_stations_as_measured_data_of_datex_ii(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["count", str(run), "--line", "gate=0,50,100,50", "--interval", "1", *DATEX]
+    assert main(words) == 0
+    first = (tmp_path / "d.xml").read_bytes()
+    text = first.decode()
+    assert "<com:country>DE</com:country>" in text
+    assert "<com:publicationTime>2026-11-27T07:30:01+01:00<" in text  # the recording lasts for a second
+    assert text.count('id="gate-right"') == 1
+    assert "<com:startOfPeriod>2026-11-27T07:30:00+01:00<" in text
+    assert "<com:vehicleFlowRate>7200<" in text  # two in a second
+    assert "<com:percentage>20<" in text
+    assert main(words) == 0
+    assert (tmp_path / "d.xml").read_bytes() == first
+    assert main([*words, "--publication-time", "2026-11-28T00:00:00Z", "--site-table", "bridges"]) == 0
+    text = (tmp_path / "d.xml").read_text()
+    assert "<com:publicationTime>2026-11-28T00:00:00+00:00<" in text
+    assert 'targetClass="roa:MeasurementSiteTable" id="bridges"' in text
+
+
 @pytest.mark.parametrize(
     ("more", "words"),
     [
@@ -207,6 +230,19 @@ def test_lanes_and_speeds_come_from_what_road_wrote(run, tmp_path):
         (["--line", "0,0,1,1", "--begin", "yesterday"], "--begin yesterday: must be a date and time"),
         (["--line", "0,0,1,1", "--od", "od.csv"], "--od needs two lines or zones"),
         (["--zone", "0,0,1,1,2,0", "--stations", "s.csv"], "--stations is of lines"),
+        (
+            ["--line", "0,0,1,1", "--datex", "d.xml"],
+            "--datex needs the date and time of the recording's time 0",
+        ),
+        (["--line", "0,0,1,1", *DATEX[4:], "--begin", "2026-11-27T07:30:00"], "--datex needs a time zone"),
+        (["--line", "0,0,1,1", *DATEX[4:], *DATEX[:2]], "--datex needs who publishes: --publisher CC:NAME"),
+        (["--line", "0,0,1,1", *DATEX, "--publisher", "Bonn"], "--datex needs who publishes"),
+        (
+            ["--line", "0,0,1,1", *DATEX, "--publication-time", "now"],
+            "--publication-time now: must be a date",
+        ),
+        (["--line", "0,0,1,1", *DATEX[2:4]], "--publisher says nothing without --datex"),
+        (["--zone", "0,0,1,1,2,0", *DATEX], "is of lines"),
         (["--line", "0,0,1,1", "--road", "road"], "--road says nothing without --stations"),
         (["--lines", "marks.yaml"], "marks.yaml: must hold lines: {name: [x1, y1, x2, y2]} or zones"),
     ],

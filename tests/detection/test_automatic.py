@@ -96,12 +96,22 @@ def test_a_run_says_what_made_its_detections(folder, tmp_path):
 
 def test_one_with_still_and_unsure_boxes_is_not(folder, tmp_path):
     pytest.importorskip("onnx", reason="pip install onnx")
-    net(folder / "yolox_tiny.onnx", [[0, 0, 20, 20, 0.3, 2], [100, 70, 120, 90, 0.35, 2]])
+    net(folder / "yolox_tiny.onnx", [[0, 0, 20, 20, 0.46, 2], [100, 70, 120, 90, 0.48, 2]])
     frames = pictures(tmp_path / "frames", boxes=True)
     asked = DetectRequest(frames=frames, rate_hz=10.0, detector_frames=AUTO)
     said: list[str] = []
     assert resolved(asked, said.append).detector_frames == "motion"
     assert "0 % sound" in said[-1]
+
+
+def test_boxes_that_are_more_likely_false_do_not_count_for_it(folder, tmp_path):
+    pytest.importorskip("onnx", reason="pip install onnx")
+    net(folder / "yolox_tiny.onnx", [[10, 40, 100, 60, 0.9, 2], [0, 0, 20, 20, 0.4, 2]])
+    frames = pictures(tmp_path / "frames", boxes=True)
+    asked = DetectRequest(frames=frames, rate_hz=10.0, detector_frames=AUTO)
+    said: list[str] = []
+    assert resolved(asked, said.append).detector_frames == "yolox-tiny"
+    assert "yolox-tiny 1.0 boxes a picture, 100 % sound" in said[-1]
 
 
 def test_one_that_does_not_work_is_passed_over(folder, tmp_path):

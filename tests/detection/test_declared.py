@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.declared import declared_settings
+from jeat_graph.detection.models.onnx_head import CARD
 from jeat_graph.detection.request import DetectRequest
+from jeat_graph.detection.settings import load_settings
 
 
 @pytest.mark.parametrize("network", ["sehn", "sehn-fast", "sehn-int8"])
@@ -46,3 +49,43 @@ def test_what_the_user_says_of_a_network_of_both_sensors_counts_more(tmp_path):
     settings = [*declared_settings(request), "sensors.fused.even_score=0.6"]
     fused = load_config("default", settings).sensors["fused"]
     assert (fused.even_score, fused.rate_hz) == (0.6, 30.0)
+
+
+@pytest.mark.parametrize(
+    ("outputs", "notes", "even"),
+    [
+        ({"output": np.zeros((1, 84, 85))}, None, 0.45),
+        ({"logits": np.zeros((1, 9, 92)), "pred_boxes": np.zeros((1, 9, 4))}, None, 0.5),
+        ({"output": np.zeros((1, 84, 85))}, {CARD: "{}"}, None),
+        ({"odd": np.zeros((1, 7))}, None, None),
+    ],
+    ids=["yolox", "detr with nothing as a class", "one that `train` made", "of no layout"],
+)
+def test_the_layout_of_a_foreign_network_says_what_its_scores_mean(tmp_path, outputs, notes, even):
+    pytest.importorskip("onnx", reason="pip install onnx")
+    from .models.tiny import constant_net
+
+    network = tmp_path / "other.onnx"
+    constant_net(network, outputs, (64, 64), notes=notes)
+    said: list[str] = []
+    request = DetectRequest(frames="a", detector_frames=str(network))
+    settings = declared_settings(request, said.append)
+    if even is None:
+        assert (settings, said) == ([], [])
+        return
+    assert load_config("default", settings).sensors["rgb"].even_score == even
+    assert f"score {even:g}" in said[0]
+    (tmp_path / "other.tracking.yaml").write_text("sensor: {even_score: 0.7}\n", encoding="utf-8")
+    assert load_config("default", declared_settings(request)).sensors["rgb"].even_score == 0.7
+
+
+def test_a_layout_that_the_user_says_counts(tmp_path):
+    pytest.importorskip("onnx", reason="pip install onnx")
+    from .models.tiny import constant_net
+
+    network = tmp_path / "other.onnx"
+    logits, boxes = np.zeros((1, 9, 3), np.float32), np.zeros((1, 9, 4), np.float32)
+    constant_net(network, {"logits": logits, "pred_boxes": boxes}, (64, 64))
+    settings = load_settings(None, ["model_frames.layout=detr-softmax"])
+    request = DetectRequest(frames="a", detector_frames=str(network), settings=settings)
+    assert load_config("default", declared_settings(request)).sensors["rgb"].even_score == 0.5

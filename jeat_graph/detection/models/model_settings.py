@@ -14,18 +14,25 @@ _OTHERS_OVERLAPS = (0.5, 1.0)
 #: Above this two boxes of different classes are one thing.
 _ACROSS = 0.65
 #: Scores below are left out: of networks that `train` made, whose scores the tracker knows, and of others by
-#: layout: `yolox` and `nanodet` measured on a street, the others as their own tools have it
-#: (Ultralytics `conf`; RT-DETR and D-FINE draw from .4 to .6).
+#: layout, as their own tools have it (Ultralytics `conf`; `demo` of YOLOX and NanoDet; RT-DETR and D-FINE
+#: draw from .4 to .6).
 _OWN_SCORE, _OTHERS_SCORE = 0.1, 0.25
 _SCORES = {
-    "yolox": 0.5,
-    "yolox-raw": 0.5,
-    "nanodet": 0.4,
+    "yolox": 0.3,
+    "yolox-raw": 0.3,
+    "nanodet": 0.35,
     "rtdetr": 0.4,
     "detr": 0.4,
     "detr-softmax": 0.5,
     "boxes": 0.4,
 }
+#: The score at which a box is as likely real as not (`even_score`). All layouts but one learn to score how
+#: well a box will fit: its overlap with the object, and 0 where there is none. Such a score is P(real) times
+#: the mean overlap of boxes that match, .8 to .9, so even is .40 to .45. Measured with truth, by the logistic
+#: regression of `calibrate`: .446 and .450 for boxes of YOLOX in MOT17 and DanceTrack. A softmax over classes
+#: and nothing is the probability itself.
+_EVEN_FIT, _EVEN_PROBABILITY = 0.45, 0.5
+_PROBABLE = ("detr-softmax",)
 LAYOUTS = (
     "auto",
     "yolox",
@@ -133,6 +140,11 @@ class ModelSettings(Section):
         if self.score is not None:
             return self.score
         return _OWN_SCORE if own else _SCORES.get(layout, _OTHERS_SCORE)
+
+    @staticmethod
+    def even_score(layout: str) -> float:
+        """Return the score at which a box of a foreign network of pictures is as likely real as not."""
+        return _EVEN_PROBABILITY if layout in _PROBABLE else _EVEN_FIT
 
     @property
     def open_side(self) -> tuple[int, int]:

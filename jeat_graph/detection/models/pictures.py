@@ -12,7 +12,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.detection.models.engine import open_engine
 from jeat_graph.detection.models.feeding import place, usual_feed
 from jeat_graph.detection.models.model_settings import ModelSettings
-from jeat_graph.detection.models.onnx_head import Port, read_onnx_head
+from jeat_graph.detection.models.onnx_head import CARD, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
 from jeat_graph.io.media.decoders import RgbImage
 
@@ -29,6 +29,7 @@ class ModelPictureDetector:
 
     Attributes:
         description: one line that says what was recognised.
+        even_score: at which a box is as likely real as not, as of the layout; None for files of `train`.
 
     Raises:
         ConfigError: a backend that is not installed, or a class that is not known.
@@ -48,6 +49,7 @@ class ModelPictureDetector:
             head.outputs, self._side, head.notes, self._settings, self._path, coco=True
         )
         layout = self._outputs.layout
+        self.even_score = None if CARD in head.notes else self._settings.even_score(layout)
         self._feed = usual_feed(layout, self._settings)
         self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
         width, height = self._side

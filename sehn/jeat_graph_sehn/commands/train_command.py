@@ -31,7 +31,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "data",
         nargs="+",
         metavar="DATA",
-        help="folders that `simulate --sensors pictures` wrote; for frames also COCO (FILE.json)",
+        help="folders that `simulate --sensors pictures` wrote; for frames also COCO (FILE.json); for events "
+        "also recordings with boxes beside them, as of Gen1, 1 Megapixel, eTraM (--set labels.classes=1mpx)",
     )
     add(
         "--out",
@@ -118,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
     if args.int8:
         from jeat_graph_sehn.training.procedure import bring_to_int8
 
-        looks = bring_to_int8(_start(args.kind, [args.int8])[0], request)
+        looks = bring_to_int8(_start(args.kind, [args.int8])[0], request, partial(say, "train"))
         print(f"wrote {request.out}, by {looks} {'pictures' if args.kind == _KINDS[0] else 'windows'}")
         return 0
     if args.threads:

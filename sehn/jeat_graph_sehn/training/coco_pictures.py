@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,9 @@ from jeat_graph_sehn.training.truth_at import TrueBoxes
 _SEPARATE = "/"
 
 
-def read_coco_pictures(path: Path, pictures: Path | None = None) -> list[Picture]:
+def read_coco_pictures(
+    path: Path, pictures: Path | None = None, on_read: Callable[[str], object] = lambda _: None
+) -> list[Picture]:
     """Read a list of pictures with their boxes.
 
     Boxes of classes that sound like vehicles are kept, all where none does. `iscrowd` and `ignore` mark
@@ -28,6 +31,7 @@ def read_coco_pictures(path: Path, pictures: Path | None = None) -> list[Picture
     Args:
         path: the annotations.
         pictures: where the names of the pictures begin; by default beside the file, above it, or `images`.
+        on_read: called with what is being read, again and again.
 
     Raises:
         DataError: names the entry that is not as it should be, or the first picture that is not there.
@@ -36,7 +40,9 @@ def read_coco_pictures(path: Path, pictures: Path | None = None) -> list[Picture
     names = {int(c["id"]): str(c.get("name", c["id"])) for c in _list(tree, "categories", path) if "id" in c}
     wanted, _ = wanted_classes((), len(names) or None, names)
     rows: dict[int, list[tuple[list[float], bool, int]]] = {}
-    for k, entry in enumerate(_list(tree, "annotations", path)):
+    marks = _list(tree, "annotations", path)
+    for k, entry in enumerate(marks):
+        on_read(f"{path.name}: {k} of {len(marks)} annotations")
         try:
             box = [float(value) for value in entry["bbox"]]
             image, category = int(entry["image_id"]), int(entry.get("category_id", 0))
@@ -52,7 +58,9 @@ def read_coco_pictures(path: Path, pictures: Path | None = None) -> list[Picture
             rows.setdefault(image, []).append((corners, left_out, int(entry.get("track_id", k))))
     found = []
     root: Path | None = None
-    for k, entry in enumerate(_list(tree, "images", path)):
+    entries = _list(tree, "images", path)
+    for k, entry in enumerate(entries):
+        on_read(f"{path.name}: {k} of {len(entries)} pictures")
         if "file_name" not in entry or "id" not in entry:
             raise DataError(f"image {k + 1} needs id and file_name", path)
         name = str(entry["file_name"])

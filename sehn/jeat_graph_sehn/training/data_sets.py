@@ -6,7 +6,7 @@ What is learned from and what is judged never share a segment: neighbouring fram
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -14,6 +14,8 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.events.dsec_hdf5 import EventFile
+from jeat_graph.io.events.indexed import IndexedFile
 from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph.io.media.video import VIDEO_FILES, open_frames
 from jeat_graph.io.tables.truth_io import read_truth
@@ -52,12 +54,18 @@ class EventSegment:
         source: name of the data set.
         path: the file of events.
         truth: boxes by time.
+        part: `train`, `val` or `test` where the data set's folders say it.
     """
 
     group: str
     source: str
     path: Path
     truth: TruthByTime
+    part: str = field(default="", kw_only=True)
+
+    def open(self) -> IndexedFile:
+        """Open its events; the picture's size may be None."""
+        return EventFile(self.path)
 
 
 @dataclass(frozen=True)
@@ -111,25 +119,31 @@ def segments_of(root: Path) -> list[Path]:
     found = sorted(p for p in inner.iterdir() if (p / _TRUTH).is_file()) if inner.is_dir() else []
     if not found:
         raise DataError(
-            "holds no segments with truth; give a folder that `simulate --sensors pictures` wrote, or a COCO "
-            "file (.json)",
+            "holds no segments with truth; give a folder that `simulate --sensors pictures` wrote, for "
+            "pictures a COCO file (.json), for events recordings with boxes beside them (NAME_td.dat, "
+            "NAME_bbox.npy)",
             root,
         )
     return found
 
 
-def read_pictures(root: Path, far_px: float | None = None) -> list[Picture]:
+def read_pictures(
+    root: Path, far_px: float | None = None, on_read: Callable[[str], object] = lambda _: None
+) -> list[Picture]:
     """Return the pictures of a folder that have truth.
 
     Args:
         root: as `simulate` writes it.
         far_px: ask also for far vehicles whose boxes are so wide and high (px); None: as the truth does.
+        on_read: called with what is being read, again and again.
 
     Raises:
         DataError: there are none.
     """
     found = []
-    for folder in segments_of(root):
+    folders = segments_of(root)
+    for k, folder in enumerate(folders):
+        on_read(f"{root.name}: {k} of {len(folders)} segments")
         place = next((folder / name for name in VIDEO_FILES.values() if (folder / name).exists()), None)
         if place is None:
             continue
@@ -145,30 +159,35 @@ def read_pictures(root: Path, far_px: float | None = None) -> list[Picture]:
     return found
 
 
-def read_event_segments(root: Path, far_px: float | None = None) -> list[EventSegment]:
+def read_event_segments(
+    root: Path, far_px: float | None = None, on_read: Callable[[str], object] = lambda _: None
+) -> list[EventSegment]:
     """Return the recordings of events of a folder; arguments as `read_pictures`.
 
     Raises:
         DataError: there are none.
     """
-    found = [
-        EventSegment(str(folder), root.name, folder / _EVENTS, _truth(folder, far_px))
-        for folder in segments_of(root)
-        if (folder / _EVENTS).is_file()
-    ]
+    found = []
+    folders = segments_of(root)
+    for k, folder in enumerate(folders):
+        on_read(f"{root.name}: {k} of {len(folders)} segments")
+        if (folder / _EVENTS).is_file():
+            found.append(EventSegment(str(folder), root.name, folder / _EVENTS, _truth(folder, far_px)))
     if not found:
         raise DataError("holds no events; make it with --sensors pictures or events", root)
     return found
 
 
-def read_fused_segments(root: Path, far_px: float | None = None) -> list[FusedSegment]:
+def read_fused_segments(
+    root: Path, far_px: float | None = None, on_read: Callable[[str], object] = lambda _: None
+) -> list[FusedSegment]:
     """Return the recordings of a folder that have pictures and events; arguments as `read_pictures`.
 
     Raises:
         DataError: there are none.
     """
     found = []
-    for segment in read_event_segments(root, far_px):
+    for segment in read_event_segments(root, far_px, on_read):
         folder = Path(segment.group)
         place = next((folder / name for name in VIDEO_FILES.values() if (folder / name).exists()), None)
         if place is not None:
@@ -201,10 +220,10 @@ class _Loader:
 def split_by_segment(members: Sequence[Member], roots: Sequence[Path]) -> Split[Member]:
     """Part what is learned from what is judged, segment by segment.
 
-    A data set's own split counts (`val.txt`); where none has one, each eighth segment is judged. What
-    belongs to a set's `test.txt` is neither.
+    A data set's own split counts (`val.txt`, or a folder `val`); where none has one, each eighth segment is
+    judged. What belongs to a set's `test.txt`, or its folder `test`, is neither.
     """
-    named = {name: _listed(roots, f"{name}.txt") for name in ("val", "test")}
+    named = {name: _listed(roots, f"{name}.txt") | _parted(members, name) for name in ("val", "test")}
     open_ones = [m for m in members if m.group not in named["test"]]
     groups = list(dict.fromkeys(m.group for m in open_ones))
     chosen = {group for group in groups if group in named["val"]}
@@ -216,6 +235,10 @@ def split_by_segment(members: Sequence[Member], roots: Sequence[Path]) -> Split[
         return Split(open_ones, open_ones, "too few segments to part: what is learned is judged too")
     learned = [m for m in open_ones if m.group not in chosen]
     return Split(learned, [m for m in open_ones if m.group in chosen], note)
+
+
+def _parted(members: Sequence[Picture | EventSegment], name: str) -> set[str]:
+    return {m.group for m in members if isinstance(m, EventSegment) and m.part == name}
 
 
 def _listed(roots: Sequence[Path], name: str) -> set[str]:

@@ -13,7 +13,6 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.detection.models.event_places import event_scale
 from jeat_graph.detection.windows import EventBins
-from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph_sehn.training.data_sets import EventSegment
 from jeat_graph_sehn.training.picture_samples import CutOut, draw_window
 from jeat_graph_sehn.training.settings import NetSettings, TrainSettings
@@ -80,7 +79,8 @@ def draw_sequence(
     """
     plan, events, size_px = drawn_events(segment, rng, net, settings)
     ends = plan.ends_us(net, settings)
-    truth = [asked_for(segment, plan.file_s(0.0), plan.file_s(end), settings.least_way_px) for end in ends]
+    begin = plan.file_s(0.0)
+    truth = [segment.truth.asked(begin, plan.file_s(end), settings.least_way_px) for end in ends]
     changes = settings.events
     shares = (changes.zoom, changes.mirror_share, changes.on_box_share)
     served = event_scale(size_px, side or size_px)
@@ -96,8 +96,8 @@ def drawn_events(
     Raises:
         DataError: the recording is too short, or cannot be read.
     """
-    with EventFile(segment.path) as file:
-        plan = _plan(segment, file, rng, net, settings)
+    with segment.open() as file:
+        plan = _plan(segment, rng, net, settings)
         end_us = plan.start_us + plan.ends_us(net, settings)[-1] / plan.rate
         events = file.between(int(plan.start_us), int(end_us) + 1)
         return plan, events, file.size_px or _extent(events)
@@ -130,14 +130,6 @@ def cut_sequence(
     )
 
 
-def asked_for(segment: EventSegment, start: float, end: float, least_px: float) -> TrueBoxes:
-    """Return the truth at `end` (s); who has hardly moved since `start` left no events and is ignored."""
-    truth = segment.truth.at(end)
-    moving = segment.truth.moved(start, end, least_px)
-    still = np.array([one not in moving for one in truth.object_id.tolist()], dtype=bool)
-    return truth._replace(ignored=truth.ignored | still)
-
-
 def windows_of(
     events: EventArray, side: tuple[int, int], net: NetSettings, ends: list[int]
 ) -> list[npt.NDArray[np.uint8]]:
@@ -163,27 +155,22 @@ def windows_of(
 
 
 def _plan(
-    segment: EventSegment,
-    file: EventFile,
-    rng: np.random.Generator,
-    net: NetSettings,
-    settings: TrainSettings,
+    segment: EventSegment, rng: np.random.Generator, net: NetSettings, settings: TrainSettings
 ) -> SequencePlan:
     """Draw when; the steps as long as the recording lets them be."""
     rate = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(settings.events.time_scale)))
     step = int(rng.integers(settings.least_step_bins, settings.most_step_bins + 1))
     place = rng.random()
     bin_us = round(net.bin_s * _US)
-    first_us = (
-        segment.truth.times[0] * _US - net.bins * bin_us / rate
-    )  # the first window may end at the first frame
-    first_us = max(first_us, 0.0)
+    first_us = max(segment.truth.begin_us(net.bins * bin_us / rate), 0.0)
     last_us = segment.truth.times[-1] * _US
     while True:
         length_us = (net.bins + (settings.steps - 1) * step) * bin_us / rate
         spare = last_us - first_us - length_us
         if spare >= 0.0:
-            return SequencePlan(first_us + place * spare, rate, step)
+            start_us = first_us + place * spare
+            later_s = segment.truth.to_label_s((start_us + length_us) / _US)
+            return SequencePlan(start_us + later_s * _US, rate, step)
         if step > settings.least_step_bins:
             step -= 1
         elif rate < settings.events.time_scale:

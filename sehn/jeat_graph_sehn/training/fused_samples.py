@@ -11,7 +11,7 @@ import numpy.typing as npt
 from jeat_graph.detection.models.event_places import event_scale
 from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph_sehn.training.data_sets import FusedSegment
-from jeat_graph_sehn.training.event_samples import Sequence, asked_for, cut_sequence, drawn_events
+from jeat_graph_sehn.training.event_samples import Sequence, cut_sequence, drawn_events
 from jeat_graph_sehn.training.fused_network import TOLD
 from jeat_graph_sehn.training.picture_samples import cut_out, draw_light, draw_window
 from jeat_graph_sehn.training.settings import COLOURS, FusedChanges, NetSettings, TrainSettings
@@ -70,7 +70,7 @@ def draw_fused(
     # Pictures show who stands; events do not.
     first_s, least_px = plan.file_s(0.0), settings.least_way_px
     truth = [
-        asked_for(segment, first_s, t, least_px) if lack.no_picture else segment.truth.at(t) for t in now
+        segment.truth.asked(first_s, t, least_px) if lack.no_picture else segment.truth.at(t) for t in now
     ]
     changes = settings.pictures
     shares = (settings.events.zoom, changes.mirror_share, changes.on_box_share)

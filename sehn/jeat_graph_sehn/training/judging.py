@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -17,13 +17,12 @@ from jeat_graph.detection.models.feeding import picture_input, place, usual_feed
 from jeat_graph.detection.models.layouts import decode
 from jeat_graph.detection.models.model_settings import OWN_OVERLAPS, ModelSettings
 from jeat_graph.eval.detection_ap import average_precision, match_greedily
-from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Picture
-from jeat_graph_sehn.training.event_samples import asked_for, windows_of
+from jeat_graph_sehn.training.event_samples import windows_of
 from jeat_graph_sehn.training.fused_network import FusedNet
 from jeat_graph_sehn.training.network import PICTURE_INPUT, VehicleNet
 from jeat_graph_sehn.training.serving import ServedNet
-from jeat_graph_sehn.training.settings import TrainSettings
+from jeat_graph_sehn.training.settings import NetSettings, TrainSettings
 from jeat_graph_sehn.training.truth_at import TrueBoxes
 
 #: How the outputs are laid out, one of those in `detection.models.layouts`.
@@ -34,12 +33,15 @@ _LEAST_SCORE = 0.01
 SIZES = {"below 12 px": (0.0, 12.0), "12 to 32 px": (12.0, 32.0), "above 32 px": (32.0, np.inf)}
 #: Windows are judged every 20 ms.
 _STEP_BINS = 4
+#: Of labels with times of their own one in so long is judged (s), each by the last of so many windows, before
+#: which the network has seen nothing.
+_APART_S, _LEADING = 0.1, 8
 #: Of a recording at least so many are.
 _LEAST_WINDOWS = 8
 #: Who has hardly moved for so long is not asked for: nothing shows it, though a memory may know of it (s).
 _SEEN_S = 0.2
 _US = 1e6
-Judged = TypeVar("Judged", Picture, EventSegment)
+Judged = TypeVar("Judged", Picture, EventSegment, float)
 
 
 class Precision(NamedTuple):
@@ -72,6 +74,7 @@ def judge(
     side: tuple[int, int],
     settings: TrainSettings,
     most: int,
+    on_look: Callable[[int, int], object] = lambda *_: None,
 ) -> dict[str, Precision]:
     """Judge a network.
 
@@ -81,6 +84,7 @@ def judge(
         side: width and height of the network's input (px).
         settings: of the training.
         most: at most so many pictures or windows, evenly chosen.
+        on_look: called with how many pictures or recordings were looked at, and how many there are.
 
     Returns:
         Precision of `all`, of each data set, and of each class of sizes.
@@ -88,11 +92,17 @@ def judge(
     net.eval()
     pictures = [m for m in members if isinstance(m, Picture)]
     segments = [m for m in members if isinstance(m, EventSegment)]
-    looks = (
-        list(_pictures(net, _evenly(pictures, most), side, settings.second_look))
-        if pictures
-        else list(_windows(net, *_shared_out(segments, most), side, settings))
-    )
+    looks: list[Looked] = []
+    if pictures:
+        chosen = _evenly(pictures, most)
+        for k, look in enumerate(_pictures(net, chosen, side, settings.second_look)):
+            looks.append(look)
+            on_look(k + 1, len(chosen))
+    else:
+        shared, each = _shared_out(segments, most)
+        for k, segment in enumerate(shared):
+            looks += _windows(net, segment, each, side, settings)
+            on_look(k + 1, len(shared))
     found = {"all": precision_of(looks)}
     for source in dict.fromkeys(look.source for look in looks):
         found[source] = precision_of([look for look in looks if look.source == source])
@@ -149,40 +159,56 @@ def _pictures(
         yield Looked(picture.source, at.back(corners), scores, picture.truth)
 
 
+class _Run(NamedTuple):
+    """Windows that follow one another: where they begin (µs), their ends after that, how many are judged."""
+
+    first_us: int
+    ends: list[int]
+    judged: int
+
+
+def _runs(segment: EventSegment, shape: NetSettings, most: int) -> list[_Run]:
+    """Return what of a recording is looked at: its first windows, or those that lead to each label."""
+    bin_us = round(shape.bin_s * _US)
+    times = segment.truth.times
+    if segment.truth.own_times:
+        apart = np.unique(np.searchsorted(times, np.arange(times[0], times[-1] + _APART_S, _APART_S)))
+        labels = [times[k] for k in apart.tolist() if k < len(times)]
+        ends = [(shape.bins + k * _STEP_BINS) * bin_us for k in range(_LEADING)]
+        return [_Run(round(t * _US) - ends[-1], ends, 1) for t in _evenly(labels, most)]
+    first_us = int(max(times[0] * _US - shape.bins * bin_us, 0.0)) // bin_us * bin_us
+    count = int((times[-1] * _US - first_us) // bin_us - shape.bins) // _STEP_BINS + 1
+    ends = [(shape.bins + k * _STEP_BINS) * bin_us for k in range(min(count, most))]
+    return [_Run(first_us, ends, len(ends))] if ends else []
+
+
 @torch.no_grad()
 def _windows(
-    net: VehicleNet,
-    segments: Sequence[EventSegment],
-    most: int,
-    side: tuple[int, int],
-    settings: TrainSettings,
+    net: VehicleNet, segment: EventSegment, most: int, side: tuple[int, int], settings: TrainSettings
 ) -> Iterator[Looked]:
     shape = net.settings
-    bin_us = round(shape.bin_s * _US)
-    for segment in segments:
-        with EventFile(segment.path) as file:
-            first_us = max(segment.truth.times[0] * _US - shape.bins * bin_us, 0.0)
-            first_us = int(first_us) // bin_us * bin_us
-            count = int((segment.truth.times[-1] * _US - first_us) // bin_us - shape.bins) // _STEP_BINS + 1
-            ends = [(shape.bins + k * _STEP_BINS) * bin_us for k in range(min(count, most))]
-            if not ends:
-                continue
-            events = file.between(first_us, first_us + ends[-1])
-            size_px = file.size_px or settings.crop_px
+    reader = _Reader(net, side, settings.second_look)
+    with segment.open() as file:
+        size_px = file.size_px or settings.crop_px
         places = EventPlaces(size_px, event_scale(size_px, side))
-        own = places.moved(EventArray.trusted(events.t_us - first_us, events.x, events.y, events.polarity))
-        reader = _Reader(net, side, settings.second_look)
-        for end, window in zip(ends, windows_of(own, side, shape, ends), strict=True):
-            now = (first_us + end) / _US
-            shown = torch.from_numpy(window[None]).float()
-            corners, scores = reader.look((shown, *_seen(net, segment, now, (side, places.shown_px))))
-            begin = max(first_us / _US, now - _SEEN_S)
-            truth = (
-                segment.truth.at(now)  # pictures show who stands, too
-                if isinstance(net, FusedNet)
-                else asked_for(segment, begin, now, settings.least_way_px)
-            )
-            yield Looked(segment.source, places.back(corners), scores, truth)
+        for run in _runs(segment, shape, most):
+            events = file.between(run.first_us, run.first_us + run.ends[-1])
+            t_us = events.t_us - run.first_us
+            own = places.moved(EventArray.trusted(t_us, events.x, events.y, events.polarity))
+            reader.forget()
+            for k, window in enumerate(windows_of(own, side, shape, run.ends)):
+                now = (run.first_us + run.ends[k]) / _US
+                shown = torch.from_numpy(window[None]).float()
+                corners, scores = reader.look((shown, *_seen(net, segment, now, (side, places.shown_px))))
+                if k < len(run.ends) - run.judged:
+                    continue
+                begin = max(run.first_us / _US, now - _SEEN_S)
+                truth = (
+                    segment.truth.at(now)  # pictures show who stands, too
+                    if isinstance(net, FusedNet)
+                    else segment.truth.asked(begin, now, settings.least_way_px)
+                )
+                yield Looked(segment.source, places.back(corners), scores, truth)
 
 
 def _seen(
@@ -214,6 +240,10 @@ class _Reader:
         self._side = side
         self._device = next(net.parameters()).device
         self._served = ServedNet(net, side, second_look).to(self._device)
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin with nothing seen."""
         self._state = self._served.empty_state()
 
     def look(self, shown: tuple[torch.Tensor, ...]) -> tuple[FloatArray, FloatArray]:

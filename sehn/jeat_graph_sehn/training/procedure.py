@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -29,11 +30,18 @@ from jeat_graph_sehn.training.data_sets import (
 )
 from jeat_graph_sehn.training.export import write_onnx
 from jeat_graph_sehn.training.judging import Precision, judge
+from jeat_graph_sehn.training.labelled_sets import (
+    described_labels,
+    forget_converted,
+    holds_labels,
+    read_labelled_segments,
+)
 from jeat_graph_sehn.training.log_files import draw_log, write_log
 from jeat_graph_sehn.training.making import looks_twice, settings_of
-from jeat_graph_sehn.training.quantising import write_int8
+from jeat_graph_sehn.training.quantising import MOST_LOOKS, write_int8
 from jeat_graph_sehn.training.resizing import input_side, resized
 from jeat_graph_sehn.training.settings import COARSEST, FRAMES, FUSED, NetSettings, TrainSettings, padded
+from jeat_graph_sehn.training.telling import StepsToGo, Telling
 from jeat_graph_sehn.training.trainer import Trainer, TrainingJob
 
 _JSON = ".json"
@@ -100,17 +108,18 @@ def train(
         DataError: data that cannot be read, or do not fit.
         OtherRunError: the checkpoint beside `out` is of another training.
     """
+    telling = Telling(say)
     log, plot = request.out.with_suffix(".csv"), request.out.with_suffix(".png")
     checkpoint = request.out.with_suffix(".checkpoint")
     device = _device(request.device)
     _check_fused(request)
-    members = _read(request, request.data)
+    members = _read(request, request.data, on_read=telling.tell)
     split = _asking_far(request, split_by_segment(members, request.data))
     side = request.side or _side(members[0])
     _check_side(side, request.settings.second_look)
     unit = "pictures" if request.net.kind == FRAMES else "recordings"
     say(f"{len(split.learned)} {unit} to learn from, {len(split.judged)} to judge by; {split.note}")
-    tests = _read(request, request.tested) if request.tested else []
+    tests = _read(request, request.tested, on_read=telling.tell) if request.tested else []
     shown = {str(path.resolve()) for path in request.data} & {str(path.resolve()) for path in request.tested}
     if shown:
         raise DataError("is learned from; it cannot be the test as well", sorted(shown)[0])
@@ -133,26 +142,43 @@ def train(
         say(f"goes on from step {trainer.step} of {checkpoint}")
     count = sum(p.numel() for p in trainer.net.parameters())
     say(f"network of {count} parameters, input {side[0]} x {side[1]} px, on {device}")
-    trainer.run(on_progress)
+    say(_plan(request.settings, trainer.total, request.net))
+    telling = Telling(say)
+    to_go = StepsToGo(telling, trainer.progress)
+
+    def step_done(share: float, words: str) -> None:
+        to_go.tell(share, trainer.words())
+        on_progress(share, words)
+
+    def looked_on_the_way(done: int, of: int) -> None:
+        to_go.tell(trainer.progress, f"{trainer.words()}, judging {done} of {of} {unit}")
+
+    def looked(done: int, of: int) -> None:
+        telling.tell(f"judging {done} of {of} {unit}")
+
+    trainer.run(step_done, looked_on_the_way)
     card = {**about, "parameters": count, "steps": trainer.step, "split": split.note}
-    card["judged"] = _table(judge(trainer.average, split.judged, side, request.settings, _ALL))
+    say(f"judging by {len(split.judged)} {unit}")
+    card["judged"] = _table(judge(trainer.average, split.judged, side, request.settings, _ALL, looked))
     if tests:
         say(f"judging by {len(tests)} {unit} of {', '.join(path.name for path in request.tested)}")
         card["tested_on"] = [_described(path) for path in request.tested]
-        card["tested"] = _table(judge(trainer.average, tests, side, request.settings, _ALL))
+        card["tested"] = _table(judge(trainer.average, tests, side, request.settings, _ALL, looked))
     write_log(trainer.log, log)
     draw_log(trainer.log, plot)
     write_onnx(trainer.average, side, card, request.out, second_look=request.settings.second_look)
     checkpoint.unlink(missing_ok=True)
+    forget_converted(_cache(request))
     return Trained((request.out, log, plot), card)
 
 
-def bring_to_int8(source: Path, request: TrainRequest) -> int:
+def bring_to_int8(source: Path, request: TrainRequest, say: Callable[[str], object] = lambda _: None) -> int:
     """Write a network of 8-bit numbers, by what it sees of the data that a request learns from.
 
     Args:
         source: a network that `train` made.
         request: data and the file to write, and the input's size if it shall be another; nothing is learned.
+        say: called with what is done.
 
     Returns:
         How many pictures or windows it has looked at.
@@ -167,11 +193,15 @@ def bring_to_int8(source: Path, request: TrainRequest) -> int:
     side = request.side or input_side(source)
     twice = request.settings.second_look or (request.side is None and looks_twice(source))
     _check_side(side, twice)
-    split = split_by_segment(_read(request, request.data), request.data)
+    split = split_by_segment(_read(request, request.data, on_read=Telling(say).tell), request.data)
     about = [_described(path) for path in request.data]
+    unit = "pictures" if kind == FRAMES else "recordings"
+    say(f"looks at {MOST_LOOKS} {unit} at most, of {len(split.learned)}, then writes")
     with tempfile.TemporaryDirectory() as folder:
         sized = resized(source, side, Path(folder) / source.name, twice)
-        return write_int8(sized, split.learned, about, request.out)
+        looks = write_int8(sized, split.learned, about, request.out)
+    forget_converted(_cache(request))
+    return looks
 
 
 def _check_fused(request: TrainRequest) -> None:
@@ -207,22 +237,48 @@ def _asking_far(request: TrainRequest, split: Split[Any]) -> Split[Any]:
     return replace(split, learned=asking)
 
 
-def _read(request: TrainRequest, paths: Sequence[Path], far_px: float | None = None) -> Any:
+def _plan(settings: TrainSettings, steps: int, net: NetSettings) -> str:
+    """Say what will be done."""
+    shown = "cut-outs" if net.kind == FRAMES else f"sequences of {settings.steps} windows"
+    width, height = settings.crop_px
+    size = f"{settings.batch} {shown} of {width} x {height} px a step"
+    if settings.minutes is not None:
+        return f"trains for {settings.minutes:g} min, {size}"
+    looks = math.ceil(1.0 / settings.judge_every)
+    return f"trains for {steps} steps ({settings.epochs:g} epochs), {size}; judged {looks} times on the way"
+
+
+def _cache(request: TrainRequest) -> Path:
+    """Return the folder for recordings that are converted for the time of the training."""
+    return request.out.with_suffix(".events")
+
+
+def _read(
+    request: TrainRequest,
+    paths: Sequence[Path],
+    far_px: float | None = None,
+    on_read: Callable[[str], object] = lambda _: None,
+) -> Any:
     """Return pictures or recordings of all data sets.
 
     Raises:
+        ConfigError: something is asked of labels that they do not say.
         DataError: a data set is not what it should be, or two have one name.
     """
     found: list[Any] = []
     for path in paths:
         if request.net.kind == FUSED:
-            found += read_fused_segments(path, far_px)
+            found += read_fused_segments(path, far_px, on_read)
+        elif request.net.kind != FRAMES and holds_labels(path):
+            if far_px is not None:
+                raise ConfigError("far_px: labels say nothing of far vehicles; simulated data do")
+            found += read_labelled_segments(path, request.settings.labels, _cache(request), on_read)
         elif request.net.kind != FRAMES:
-            found += read_event_segments(path, far_px)
+            found += read_event_segments(path, far_px, on_read)
         elif path.suffix.lower() == _JSON:
-            found += read_coco_pictures(path, request.pictures)
+            found += read_coco_pictures(path, request.pictures, on_read)
         else:
-            found += read_pictures(path, far_px)
+            found += read_pictures(path, far_px, on_read)
     names = Counter(path.stem if path.suffix.lower() == _JSON else path.name for path in paths)
     name, times = names.most_common(1)[0]
     if times > 1:
@@ -235,9 +291,7 @@ def _side(member: Picture | EventSegment) -> tuple[int, int]:
     if isinstance(member, Picture):
         height, width = member.load().shape[:2]
         return padded((width, height))
-    from jeat_graph.io.events.dsec_hdf5 import EventFile
-
-    with EventFile(member.path) as file:
+    with member.open() as file:
         if file.size_px is None:
             raise DataError("does not say the size of its picture; give it with --size WxH", member.path)
         return padded(file.size_px)
@@ -256,6 +310,8 @@ def _described(path: Path) -> dict[str, Any]:
     if path.is_file():
         return {"name": path.name, "sha256": sha256_of(path)}
     found: dict[str, Any] = {"name": path.name}
+    if not (path / _MANIFEST).is_file() and holds_labels(path):
+        found["sha256 of labels"] = described_labels(path)
     for name in (_MANIFEST, _SETTINGS):
         if (path / name).is_file():
             found[f"sha256 of {name}"] = sha256_of(path / name)

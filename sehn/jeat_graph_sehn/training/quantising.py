@@ -22,7 +22,6 @@ from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.feeding import place, usual_feed
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, read_onnx_head
-from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph.io.files.atomic import atomic_path
 from jeat_graph_sehn.training.data_sets import EventSegment, Picture
 from jeat_graph_sehn.training.event_samples import windows_of
@@ -144,7 +143,7 @@ def _windows(
     later = [name for name in names if name != _BOXES]
     state = {p.name: np.zeros([s or 1 for s in p.shape], dtype=np.float32) for p in head.inputs[1:]}
     length_us = settings.bins * round(settings.bin_s * _US)
-    with EventFile(recording.path) as file:
+    with recording.open() as file:
         first_us = int(recording.truth.times[0] * _US) // length_us * length_us
         events = file.between(first_us, first_us + _WINDOWS * length_us)
         size_px = file.size_px or side

@@ -12,6 +12,8 @@ KINDS = (FRAMES, EVENTS, FUSED)
 FLOAT32, BFLOAT16 = "float32", "bfloat16"
 #: Channels of the first layer by the name of a size.
 WIDTHS = {"tiny": 8, "small": 16, "medium": 32, "large": 48}
+#: Data sets with boxes as arrays, by the names of their classes' numbers.
+LABEL_SETS = ("gen1", "1mpx", "etram")
 #: Channels of a picture: red, green, blue.
 COLOURS = 3
 
@@ -99,6 +101,27 @@ class FusedChanges(Section):
 
 
 @dataclass(frozen=True)
+class LabelSettings(Section):
+    """How the labels of Prophesee's data sets and of eTraM are read."""
+
+    classes: str = choice(
+        "auto",
+        ("auto", *LABEL_SETS),
+        "what the numbers of classes mean; auto: as label_map_dictionary.json says, and of 304 x 240 px gen1",
+    )
+    usual_filter: bool = flag(
+        False,
+        "whether what the sets' own evaluation leaves out is neither asked for nor wrong: the first 0.5 s, "
+        "and boxes with a diagonal below 60 px or a side below 20 px (gen1: 30 px, 10 px)",
+    )
+    moving_only: bool = flag(
+        False,
+        "whether vehicles that have hardly moved (least_way_px) are neither asked for nor wrong: where the "
+        "camera stands still they leave no events (eTraM); labels must come at least four times a second",
+    )
+
+
+@dataclass(frozen=True)
 class TrainSettings(Section):
     """How a network learns."""
 
@@ -163,6 +186,7 @@ class TrainSettings(Section):
     pictures: PictureChanges = field(default_factory=PictureChanges)
     events: EventChanges = field(default_factory=EventChanges)
     fused: FusedChanges = field(default_factory=FusedChanges)
+    labels: LabelSettings = field(default_factory=LabelSettings)
 
     def __post_init__(self) -> None:
         super().__post_init__()

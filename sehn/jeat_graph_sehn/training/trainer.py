@@ -87,6 +87,7 @@ class Trainer:
         average: averaged weights, which are judged and kept.
         log: rows so far.
         step: steps so far.
+        total: steps of the whole training, unless it goes by minutes.
 
     Raises:
         DataError: the checkpoint is of another training, or damaged.
@@ -107,35 +108,41 @@ class Trainer:
         )
         self._places, self._strides = (part.to(job.device) for part in cell_places(settings.crop_px))
         self.step, self.log = 0, list[LogRow]()
+        self._batches = Batches(job.split.learned, job.net, settings, job.side)
+        self.total = max(math.ceil(settings.epochs * self._batches.per_epoch), 1)
         self._spent_s = 0.0
         self._unsettled = 1.0 - settings.settled_share
         self._sums = [0.0, 0.0, 0.0, 0.0]
         if job.checkpoint.is_file():
             self._restore(read_checkpoint(job.checkpoint, job.identity, job.device))
 
-    def run(self, on_progress: Callable[[float, str], object] = lambda *_: None) -> None:
+    def run(
+        self,
+        on_progress: Callable[[float, str], object] = lambda *_: None,
+        on_look: Callable[[int, int], object] = lambda *_: None,
+    ) -> None:
         """Train to the end.
 
         Args:
             on_progress: called after each step with the share that is done, and a few words.
+            on_look: called while it is judged on the way, as of `judge`.
 
         Raises:
             DataError: data that cannot be read, or a loss that is no number any more.
         """
-        batches = Batches(self._job.split.learned, self._job.net, self._job.settings, self._job.side)
-        total = max(math.ceil(self._job.settings.epochs * batches.per_epoch), 1)
+        batches = self._batches
         begun = time.monotonic() - self._spent_s
         saved = time.monotonic()
         try:
-            while (progress := self._progress(total)) < 1.0:
+            while (progress := self.progress) < 1.0:
                 self.net.learn(settled=bool(self._job.start) or progress >= self._unsettled)
                 self._learn(batches.get(self.step), self._rate(progress))
                 self._spent_s = time.monotonic() - begun
-                after = self._progress(total)
+                after = self.progress
                 every = self._job.settings.judge_every
                 judged = after >= 1.0 or math.floor(after / every) > math.floor(progress / every)
                 if judged:
-                    self._write_row(after)
+                    self._write_row(after, on_look)
                 if judged or time.monotonic() - saved > _CHECKPOINT_S:
                     self._spent_s = time.monotonic() - begun
                     write_checkpoint(self._job.checkpoint, self._job.identity, self._state())
@@ -144,9 +151,11 @@ class Trainer:
         finally:
             batches.close()
 
-    def _progress(self, total: int) -> float:
+    @property
+    def progress(self) -> float:
+        """Share of the training that is done."""
         minutes = self._job.settings.minutes
-        return self.step / total if minutes is None else self._spent_s / (minutes * _S_PER_MIN)
+        return self.step / self.total if minutes is None else self._spent_s / (minutes * _S_PER_MIN)
 
     def _rate(self, progress: float) -> float:
         """Learning rate: a straight rise, then half a cosine."""
@@ -202,9 +211,10 @@ class Trainer:
             else:
                 mean.copy_(now)
 
-    def _write_row(self, progress: float) -> None:
+    def _write_row(self, progress: float, on_look: Callable[[int, int], object]) -> None:
         job, steps = self._job, max(self._sums[3], 1.0)
-        found = judge(self.average, job.split.judged, job.side, job.settings, job.settings.judged)["all"]
+        most = job.settings.judged
+        found = judge(self.average, job.split.judged, job.side, job.settings, most, on_look)["all"]
         loss, scores, boxes = (value / steps for value in self._sums[:3])
         # With `minutes` the share is of time, which is never twice the same.
         done = min(progress, 1.0)
@@ -213,6 +223,14 @@ class Trainer:
 
     def _words(self) -> str:
         return f"AP50 {self.log[-1].ap50:.1f}" if self.log else ""
+
+    def words(self) -> str:
+        """Say how far it is: steps, the loss since the last look, and what that look found."""
+        goal = f" of {self.total}" if self._job.settings.minutes is None else ""
+        steps = self._sums[3]
+        loss = self._sums[0] / steps if steps else self.log[-1].loss if self.log else math.nan
+        found = f", {self._words()}" if self.log else ""
+        return f"step {self.step}{goal}, loss {loss:.3g}{found}"
 
     def _state(self) -> dict[str, Any]:
         return {

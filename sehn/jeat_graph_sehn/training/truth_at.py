@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from jeat_graph.data.trajectories import GroundTruth
 #: Two frames farther apart than this are not of one motion (s).
 _LONGEST_GAP_S = 0.25
 _SAME_S = 1e-6
+_US = 1e6
 
 
 class TrueBoxes(NamedTuple):
@@ -37,7 +38,10 @@ class TruthByTime:
 
     Attributes:
         times: (T,) of the frames of the truth (s), ascending.
+        own_times: whether it holds at these times alone.
     """
+
+    own_times: ClassVar[bool] = False
 
     def __init__(self, truth: GroundTruth) -> None:
         self.times = truth.frame_times()
@@ -80,6 +84,27 @@ class TruthByTime:
             np.concatenate([a.ignored[in_a] | b.ignored[in_b], lone]),
             np.concatenate([a.object_id[in_a], a.object_id[lone_a], b.object_id[lone_b]]),
         )
+
+    def asked(self, start: float, end: float, least_px: float) -> TrueBoxes:
+        """Return the boxes at `end` (s); who has hardly moved since `start` left no events and is ignored.
+
+        Args:
+            start: when the events that are seen begin (s).
+            end: when they end (s).
+            least_px: who has gone less has hardly moved.
+        """
+        truth = self.at(end)
+        moving = self.moved(start, end, least_px)
+        still = np.array([one not in moving for one in truth.object_id.tolist()], dtype=bool)
+        return truth._replace(ignored=truth.ignored | still)
+
+    def begin_us(self, window_us: float) -> float:
+        """Return from when on sequences may be (µs): the first window may end at the first frame."""
+        return float(self.times[0]) * _US - window_us
+
+    def to_label_s(self, t: float) -> float:
+        """Return by how much a sequence that ends at `t` is to end later (s): it may end at any time."""
+        return 0.0
 
     def moved(self, start: float, end: float, least_px: float) -> set[int]:
         """Return who has gone at least `least_px` from `start` to `end` (s), to and fro counted alike.

@@ -147,5 +147,16 @@ def test_the_least_score_fits_the_layout_unless_it_is_said():
     settings = ModelSettings()
     assert settings.least_score("yolov8", own=True) == 0.1
     found = {name: settings.least_score(name, own=False) for name in ("yolox", "nanodet", "yolov8", "boxes")}
-    assert found == {"yolox": 0.5, "nanodet": 0.4, "yolov8": 0.25, "boxes": 0.4}
+    assert found == {"yolox": 0.3, "nanodet": 0.35, "yolov8": 0.25, "boxes": 0.4}
     assert ModelSettings(score=0.05).least_score("yolox", own=False) == 0.05
+
+
+def test_even_is_where_half_of_the_boxes_of_a_score_that_learned_overlaps_are_real():
+    """A score that learned the overlap of matches, and 0 elsewhere, says P(real) times their mean overlap."""
+    rng = np.random.default_rng(0)
+    likely = rng.random(200_000)  # P(real) of what a cell shows
+    real = rng.random(200_000) < likely
+    score = likely * np.clip(rng.normal(0.87, 0.08, 200_000), 0.0, 1.0)
+    near = np.abs(score - ModelSettings.even_score("yolox")) < 0.02
+    assert real[near].mean() == pytest.approx(0.5, abs=0.04)
+    assert ModelSettings.even_score("detr-softmax") == 0.5  # a probability itself
