@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.in_steps import run_through
 
 #: Step of the grid (s).
 STEP_S = 0.1
@@ -88,6 +89,13 @@ def sensor_tracks(
         boxes: (R, 4) left, top, width, height (px).
         detections: of this sensor alone.
     """
+    return run_through(sensor_tracks_in_steps(t, track_id, boxes, detections))
+
+
+def sensor_tracks_in_steps(
+    t: FloatArray, track_id: IntArray, boxes: FloatArray, detections: Detections
+) -> Generator[None, None, SensorTracks]:
+    """Do what `sensor_tracks` does, one track a step."""
     start = float(np.floor(t.min() / STEP_S)) * STEP_S if len(t) else 0.0
     steps = int(np.ceil((t.max() - start) / STEP_S)) + 1 if len(t) else 1
     grid = start + STEP_S * np.arange(steps)
@@ -109,6 +117,7 @@ def sensor_tracks(
         measured.append(one)
         far = np.linalg.norm(centre[-1] - centre[0])
         moves.append(float(far > _MOVES * np.sqrt(np.median(size.prod(axis=1)))))
+        yield
     empty = np.zeros((0, steps, 2))
     return SensorTracks(
         start,
