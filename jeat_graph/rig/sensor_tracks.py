@@ -23,6 +23,8 @@ _BIN_S = 0.2
 _SAME_IOU = 0.4
 # What moves by less than this many of its sizes stands still.
 _MOVES = 1.0
+# Scans that are looked at in one step.
+_SCANS_A_STEP = 16
 
 
 class TrackMeasurements(NamedTuple):
@@ -95,7 +97,7 @@ def sensor_tracks(
 def sensor_tracks_in_steps(
     t: FloatArray, track_id: IntArray, boxes: FloatArray, detections: Detections
 ) -> Generator[None, None, SensorTracks]:
-    """Do what `sensor_tracks` does, one track a step."""
+    """Do what `sensor_tracks` does, a part of a track each step."""
     start = float(np.floor(t.min() / STEP_S)) * STEP_S if len(t) else 0.0
     steps = int(np.ceil((t.max() - start) / STEP_S)) + 1 if len(t) else 1
     grid = start + STEP_S * np.arange(steps)
@@ -106,7 +108,7 @@ def sensor_tracks_in_steps(
         if when[-1] - when[0] < _LEAST_S:
             continue
         centre, size = own[:, :2] + 0.5 * own[:, 2:], own[:, 2:]
-        one = _measurements(when, own, detections)
+        one = yield from _measurements(when, own, detections)
         if len(one.t) < 2:
             continue
         at = np.column_stack([np.interp(grid, when, v, np.nan, np.nan) for v in (*centre.T, *size.T)])
@@ -128,11 +130,15 @@ def sensor_tracks_in_steps(
     )
 
 
-def _measurements(t: FloatArray, boxes: FloatArray, detections: Detections) -> TrackMeasurements:
+def _measurements(
+    t: FloatArray, boxes: FloatArray, detections: Detections
+) -> Generator[None, None, TrackMeasurements]:
     """Take the detections that a track rests on, a few at a time, in their mean."""
     first = np.searchsorted(detections.scan_t, t - 1e-9)
     times, centres, sizes = [], [], []
     for k, scan in enumerate(first):
+        if k % _SCANS_A_STEP == 0:
+            yield
         if scan >= detections.num_scans or abs(detections.scan_t[scan] - t[k]) > 1e-6:
             continue
         found = detections.boxes[detections.scan_start[scan] : detections.scan_start[scan + 1]]

@@ -54,7 +54,7 @@ class ClockComparison(NamedTuple):
 
 
 def compare_in_steps(
-    first: Detections, second: Detections, pair: tuple[str, str], looked_at_s: float = LOOKED_AT_S
+    first: Detections, second: Detections, pair: tuple[str, str], latest_s: float | None = None
 ) -> Generator[None, None, ClockComparison]:
     """Compare the clocks of two sensors, a little each step.
 
@@ -62,13 +62,14 @@ def compare_in_steps(
         first: of the sensor whose clock is taken for right.
         second: of the other.
         pair: names of both.
-        looked_at_s: so much is tracked for the exact offset (s).
+        latest_s: only the latest so much is tracked for the exact offset (s); by default the first
+            `LOOKED_AT_S`.
     """
     agreed = yield from agreement_in_steps(first, second)
     if agreed is None:
         return ClockComparison(False, None, "")
     if _differ(agreed):
-        found = yield from _exactly(first, second, agreed, looked_at_s)
+        found = yield from _exactly(first, second, agreed, latest_s)
         return ClockComparison(False, found, "")
     contradiction = yield from _contradiction(first, second, agreed, pair)
     return ClockComparison(_agree(agreed), None, contradiction)
@@ -89,13 +90,17 @@ def _agree(agreed: Agreement) -> bool:
 
 
 def _exactly(
-    first: Detections, second: Detections, agreed: Agreement, looked_at_s: float
+    first: Detections, second: Detections, agreed: Agreement, latest_s: float | None
 ) -> Generator[None, None, FoundClock]:
     """Find the offset to the millisecond by the motion of vehicles that both saw."""
     offset_s = agreed.offset_s
     # Both are tracked for as long as both look, but no longer than is needed.
     begin = max(first.scan_t[0], second.scan_t[0] - offset_s)
-    end = min(first.scan_t[-1], second.scan_t[-1] - offset_s, begin + looked_at_s)
+    end = min(first.scan_t[-1], second.scan_t[-1] - offset_s)
+    if latest_s is None:
+        end = min(end, begin + LOOKED_AT_S)
+    else:
+        begin = max(begin, end - latest_s)
     ours = yield from own_tracks_in_steps(_between(first, begin, end))
     theirs = yield from own_tracks_in_steps(_between(second, begin + offset_s, end + offset_s))
     same = PictureMap(np.eye(3, 4))
