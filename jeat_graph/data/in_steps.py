@@ -16,3 +16,9 @@ def run_through(work: Generator[None, None, _Result]) -> _Result:
         except StopIteration as end:
             result: _Result = end.value
             return result
+
+
+def worth(steps: int) -> Generator[None, None, None]:
+    """Count what has just been done, and cannot be done in parts, for so many steps."""
+    for _ in range(steps):
+        yield

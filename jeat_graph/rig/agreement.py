@@ -16,7 +16,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.in_steps import run_through
 
 # Scans of the second sensor that are compared, and boxes of one that are.
-_SCANS, _MOST_BOXES = 240, 24
+_SCANS, _LEAST_SCANS, _MOST_BOXES = 240, 60, 24
 # Boxes agree where their centres are apart by less than this share of their size, sizes within this factor.
 _REACH, _SAME_SIZE = 0.6, 2.0
 # Differences that are tried (s): finely near none, coarsely elsewhere, and how far from none and from the
@@ -68,12 +68,24 @@ def best_agreement(first: Detections, second: Detections) -> Agreement | None:
     return run_through(agreement_in_steps(first, second))
 
 
-def agreement_in_steps(first: Detections, second: Detections) -> Generator[None, None, Agreement | None]:
-    """Do what `best_agreement` does, one difference of the clocks a step."""
+def agreement_in_steps(
+    first: Detections, second: Detections, pairs: int | None = None
+) -> Generator[None, None, Agreement | None]:
+    """Do what `best_agreement` does, one difference of the clocks a step.
+
+    Args:
+        first: as there.
+        second: as there.
+        pairs: so many pairs of boxes are compared in one step at most, by looking at fewer scans.
+    """
     if min(len(first), len(second)) < _LEAST_BOXES:
         return None
     ours = yield from _looks(first, None)
-    theirs = yield from _looks(second, _SCANS)
+    scans = _SCANS
+    if pairs is not None:
+        wide = ours.boxes.shape[1] * min(int(np.diff(second.scan_start).max()), _MOST_BOXES)
+        scans = min(scans, max(pairs // wide, _LEAST_SCANS))
+    theirs = yield from _looks(second, scans)
     tried = _differences(ours.t, theirs.t)
     if not len(tried):
         return None

@@ -14,7 +14,7 @@ import numpy as np
 
 from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.in_steps import run_through
+from jeat_graph.data.in_steps import run_through, worth
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.rig.clock_search import offset_of, rank_offsets
 from jeat_graph.rig.matching import MatchedTracks, match_again, match_at, no_tracks
@@ -23,6 +23,8 @@ from jeat_graph.rig.sensor_tracks import SensorTracks, joined
 
 # Rough differences of the clocks that are tried, and rounds of matching and refining.
 _CANDIDATES, _ROUNDS = 4, 2
+# What a round of matching is worth in steps of about a millisecond.
+_MATCHING_STEPS = 16
 #: Fewer vehicles tell nothing.
 LEAST_VEHICLES = 8
 # Of the vehicles that both could see such a share must be matched; a map that is quite another has no more
@@ -128,7 +130,7 @@ def clock_by_map_in_steps(
     found = []
     for guess in guesses_s:
         found.append(match_again(first, second, MatchedTracks(none, none, way, guess, 0)))
-        yield
+        yield from worth(_MATCHING_STEPS)
     best = max(found, key=lambda one: len(one.a), default=None)
     if best is None or len(best.a) < max(least, _LEAST_SHARE * best.possible):
         return None
@@ -137,9 +139,9 @@ def clock_by_map_in_steps(
         clock = _offset_of_matches(first, second, best, least)
         if clock is None:
             return None
-        yield
+        yield from worth(_MATCHING_STEPS)
         best = match_again(first, second, best._replace(offset_s=clock.offset_s))
-        yield
+        yield from worth(_MATCHING_STEPS)
     return clock
 
 

@@ -21,6 +21,8 @@ _BETTER, _CLEAR, _LEAST_USUAL = 0.08, 2.5, 0.05
 _LEAST_VEHICLES, _SIGNIFICANT = 5, 4.0
 #: Smaller offsets move no box by more than its noise (s).
 LEAST_S = 0.02
+# So many pairs of boxes are compared in one step where somebody waits for it (a millisecond or less).
+_PAIRS_A_STEP = 25_000
 #: That much of a recording is looked at for the exact offset (s): a tracker needs a few seconds for it.
 LOOKED_AT_S = 90.0
 # Sensors contradict each other where each sees so many vehicles drive, most of them where the other one sees
@@ -62,10 +64,11 @@ def compare_in_steps(
         first: of the sensor whose clock is taken for right.
         second: of the other.
         pair: names of both.
-        latest_s: only the latest so much is tracked for the exact offset (s); by default the first
-            `LOOKED_AT_S`.
+        latest_s: only the latest so much is tracked for the exact offset (s), and steps are kept short; by
+            default the first `LOOKED_AT_S` is.
     """
-    agreed = yield from agreement_in_steps(first, second)
+    pairs = None if latest_s is None else _PAIRS_A_STEP
+    agreed = yield from agreement_in_steps(first, second, pairs)
     if agreed is None:
         return ClockComparison(False, None, "")
     if _differ(agreed):

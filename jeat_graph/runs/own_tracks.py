@@ -7,13 +7,13 @@ from collections.abc import Generator
 
 from jeat_graph.config.reading import as_config, load_config
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.in_steps import run_through
+from jeat_graph.data.in_steps import run_through, worth
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.rig.sensor_tracks import SensorTracks, sensor_tracks_in_steps
 from jeat_graph.runs.declaring import fit_input
 from jeat_graph.tracking.tracker import Tracker
 
-_SCANS_A_STEP, _SCANS_PER_DRAIN = 2, 256
+_SCANS_PER_DRAIN, _DRAINING_STEPS = 256, 8
 
 
 def own_tracks(detections: Detections, size_px: tuple[float, float] | None = None) -> SensorTracks:
@@ -29,7 +29,7 @@ def own_tracks(detections: Detections, size_px: tuple[float, float] | None = Non
 def own_tracks_in_steps(
     detections: Detections, size_px: tuple[float, float] | None = None
 ) -> Generator[None, None, SensorTracks]:
-    """Do what `own_tracks` does, some scans or one track a step."""
+    """Do what `own_tracks` does, one scan or a part of one track a step."""
     config = fit_input(as_config(load_config("default"), size_px), detections)[0]
     tracker = Tracker(config)
     parts: list[Trajectories] = []
@@ -40,9 +40,9 @@ def own_tracks_in_steps(
             tracker.step(batch)
         if k % _SCANS_PER_DRAIN == 0:
             parts.append(tracker.drain_smoothed())
-        if k % _SCANS_A_STEP == 0:
-            yield
+            yield from worth(_DRAINING_STEPS)
+        yield
     parts.append(tracker.finish())
     table = Trajectories.concatenate(parts)
-    yield
+    yield from worth(_DRAINING_STEPS)
     return (yield from sensor_tracks_in_steps(table.t, table.track_id, table.boxes, detections))
