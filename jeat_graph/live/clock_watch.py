@@ -33,7 +33,7 @@ _FIRST_S, _EARLY, _MOST_BETWEEN_S = 15.0, 4, 3600.0
 # So much is tracked for the exact offset (s): it bounds the work.
 _LOOKED_AT_S = 25.0
 # Steps of the work for each second that a sensor goes on, and at most with one message.
-_STEPS_A_SECOND, _MOST_STEPS = 250.0, 12
+_STEPS_A_SECOND, _MOST_STEPS = 250.0, 25
 # Two comparisons say the same where they differ by no more than this, or so many standard deviations.
 _SAME_S, _SAME_STD = 0.005, 4.0
 # So many scans in a row that are far from the sensor's others are its new time.

@@ -74,7 +74,7 @@ def compare_in_steps(
     if _differ(agreed):
         found = yield from _exactly(first, second, agreed, latest_s)
         return ClockComparison(False, found, "")
-    contradiction = yield from _contradiction(first, second, agreed, pair)
+    contradiction = yield from _contradiction(first, second, agreed, pair, latest_s)
     return ClockComparison(_agree(agreed), None, contradiction)
 
 
@@ -120,14 +120,14 @@ def _between(detections: Detections, begin: float, end: float) -> Detections:
 
 
 def _contradiction(
-    first: Detections, second: Detections, agreed: Agreement, pair: tuple[str, str]
+    first: Detections, second: Detections, agreed: Agreement, pair: tuple[str, str], latest_s: float | None
 ) -> Generator[None, None, str]:
     """Say so where sensors see traffic in the same places and never the same vehicles."""
     if agreed.best >= _NEVER or not _same_places(first, second):
         return ""
     moving = []
     for one in (first, second):
-        begin = float(one.scan_t[0])
+        begin = float(one.scan_t[0] if latest_s is None else one.scan_t[-1] - latest_s)
         tracks: SensorTracks = yield from own_tracks_in_steps(_between(one, begin, begin + LOOKED_AT_S))
         moving.append(int(tracks.moves.sum()))
     if min(moving) < _MANY:

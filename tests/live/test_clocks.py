@@ -294,7 +294,7 @@ def test_each_message_costs_little():
         assert all(one["scans"][-1].t - one["scans"][0].t <= 60.0 for one in kept)
         if watch.clocks:
             break
-    assert 0 < most <= 12
+    assert 0 < most <= 25
 
 
 def test_stream_finds_it_and_the_record_has_it(tmp_path, monkeypatch, capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 
 import numpy as np
@@ -336,3 +337,65 @@ def test_a_message_of_several_pieces_does_not_part_from_its_own_stamp(tmp_path, 
     found, reader = read(write(tmp_path, 2, [message], "event_camera_msgs/msg/EventPacket", store))
     assert [row[1:] for row in rows(found)] == [row[1:] for row in read_evt3(data).events]
     assert reader.damage.notes() == []
+
+
+def test_the_stamps_of_all_messages_may_be_the_clock(tmp_path, capsys):
+    """The first event of each message has its stamp, others lie as the camera says; `info` shows both."""
+    store = store_of(2)
+    words = np.array([(k * 1_000_000) | 5 << 32 | 6 << 48 for k in range(3)], "<u8").tobytes()
+    late = [0.0, 0.003, 0.050]
+    messages = [
+        packet(store, 2, "mono", words, SECOND + 0.5 + 0.01 * k + late[k], 10**7 * k) for k in range(3)
+    ]
+    path = write(tmp_path, 2, messages, "event_camera_msgs/msg/EventPacket", store)
+    with open_events(path, layout=EventLayout(clock="header")) as reader:
+        t_us = np.concatenate([piece.t_us for piece in reader.pieces()])
+        stamps = reader.stamps
+    first = [500_000, 513_000, 570_000]
+    expected = [first[0] + 1300 * j for j in range(3)] + [first[1] + 5700 * j for j in range(3)]
+    expected += [first[2] + 1000 * j for j in range(3)]
+    np.testing.assert_allclose(t_us, expected, atol=1)  # µs, to which stamps are rounded
+    begin = SECOND * 10**6
+    np.testing.assert_allclose(
+        stamps, (begin + first[0], begin + first[2], 0, 20_000, 50_000), rtol=0, atol=1
+    )
+    assert main(["events", "info", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert f"stamps of messages: {SECOND}.500000 to {SECOND}.5" in said
+    assert "0.000000 to 0.020000 s by the camera's own clock" in said
+    assert "part by up to 0.05" in said
+    assert "(--event-clock header goes by the stamps)" in said
+    assert main(["events", "info", str(path), "--json", "--event-clock", "header"]) == 0
+    assert json.loads(capsys.readouterr().out)["stamps"]["apart_us"] == pytest.approx(50_000, abs=1)
+
+
+def test_stamps_that_do_not_go_on_are_passed_over(tmp_path):
+    store = store_of(2)
+    words = np.array([0 | 5 << 32 | 6 << 48, 1_000_000 | 5 << 32 | 6 << 48], "<u8").tobytes()
+    stamps = [SECOND + 0.5, SECOND + 0.4, SECOND + 0.52]
+    messages = [packet(store, 2, "mono", words, stamp, 10**7 * k) for k, stamp in enumerate(stamps)]
+    path = write(tmp_path, 2, messages, "event_camera_msgs/msg/EventPacket", store)
+    with open_events(path, layout=EventLayout(clock="header")) as reader:
+        t_us = np.concatenate([piece.t_us for piece in reader.pieces()])
+    np.testing.assert_allclose(t_us, [500_000, 501_000, 510_000, 511_000, 520_000, 521_000], atol=1)
+
+
+def test_events_with_the_clock_of_the_bag_keep_it_whatever_is_asked(tmp_path, capsys):
+    store = store_of(2)
+    data = np.array([(1000 * k) | k << 32 | k << 48 for k in range(5)], "<u8").tobytes()
+    message = packet(store, 2, "mono", data, SECOND + 0.25, SECOND * 10**9)
+    path = write(tmp_path, 2, [message], "event_camera_msgs/msg/EventPacket", store)
+    found = []
+    for clock in (None, "sensor", "header"):
+        with open_events(path, layout=EventLayout(clock=clock)) as reader:
+            found.append(np.concatenate([piece.t_us for piece in reader.pieces()]).tolist())
+    assert found == [[0, 1, 2, 3, 4]] * 3
+    assert main(["events", "info", str(path)]) == 0
+    assert "the same clock" in capsys.readouterr().out
+
+
+def test_other_files_have_no_two_clocks(tmp_path):
+    path = tmp_path / "e.raw"
+    path.write_bytes(b"% evt 2.0\n% geometry 8x8\n% end\n")
+    with pytest.raises(DataError, match="is EVT2, where --event-clock says nothing"):
+        open_events(path, layout=EventLayout(clock="header"))
