@@ -125,7 +125,7 @@ class LiveTracker:
 
         Args:
             scans: as `Tracker.step`; their times are the measurement's own, but for the sensor's `latency_s`
-                and `clock`.
+                and `clock`, and for what is found of its clock while scans come (`clocks`).
 
         Raises:
             DataError, UnknownSensorError: as `Tracker.step`; the state is as before.
@@ -200,9 +200,9 @@ class LiveTracker:
                 f"scans of {names} come {late_s:.2f} s later than others of the same time, which is more "
                 f"than answers wait (live.wait_s is {most_s:g}): they are passed over"
             ]
-        waiting = [] if self._room is None else self._room.clear()
         begun_s = -math.inf if self.time is None else self.time
-        self._room = WaitingRoom(slow, late_s + _JITTER_S, begun_s, back_s, waiting)
+        room = WaitingRoom(slow, late_s + _JITTER_S, begun_s, back_s)
+        self._room = room if self._room is None else room.beside(self._room)
         return [
             f"scans of {names} come {late_s:.2f} s later than others of the same time: from now on answers "
             "wait for them (--set live.wait_s=0 passes them over instead)"

@@ -34,26 +34,26 @@ class WaitingRoom:
         most_s: how long scans wait at most, by the times of all sensors (s).
         begun_s: the time that the tracker has reached (s).
         back_s: how far it can go back (s).
-        waiting: scans that wait already.
     """
 
-    def __init__(
-        self,
-        slow: Mapping[str, float],
-        most_s: float,
-        begun_s: float,
-        back_s: float,
-        waiting: Sequence[Scan] = (),
-    ) -> None:
+    def __init__(self, slow: Mapping[str, float], most_s: float, begun_s: float, back_s: float) -> None:
         self._slow = dict(slow)
         self._most_s, self._back_s = most_s, back_s
-        self._begun_s, self._scans = begun_s, list(waiting)
-        self._newest_s = max([begun_s, *(scan.t for scan in waiting)])
+        self._begun_s = self._newest_s = begun_s
+        self._scans: list[Scan] = []
 
     @property
     def newest_s(self) -> float:
         """Time of the newest scan that has come (s)."""
         return self._newest_s
+
+    def beside(self, other: WaitingRoom) -> WaitingRoom:
+        """Return this room with those that wait in another, and for whom they do."""
+        self._slow = {**other._slow, **self._slow}
+        self._most_s = max(self._most_s, other._most_s)
+        self._scans = other.clear()
+        self._newest_s = max(self._newest_s, other._newest_s)
+        return self
 
     def holds(self, scan: Scan) -> bool:
         """Whether the sensor's scan of that time waits."""
@@ -108,9 +108,8 @@ class WaitingRoom:
     @staticmethod
     def of_state(state: Mapping[str, Any]) -> WaitingRoom:
         """Return what `state` was taken of."""
-        names = ("slow", "most_s", "begun_s", "back_s", "scans")
-        room = WaitingRoom(*(state[name] for name in names))
-        room._newest_s = state["newest_s"]
+        room = WaitingRoom(state["slow"], state["most_s"], state["begun_s"], state["back_s"])
+        room._newest_s, room._scans = state["newest_s"], list(state["scans"])
         return room
 
 

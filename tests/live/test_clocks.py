@@ -18,6 +18,7 @@ from jeat_graph.io.streams.scan_batch import ScanBatch
 from jeat_graph.live.clock_watch import ClockWatch
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import ScanMessage
+from jeat_graph.live.service.status import Status
 from jeat_graph.live.session import Ends, Session
 from jeat_graph.tracking.tracker import Tracker
 
@@ -312,3 +313,13 @@ def test_stream_finds_it_and_the_record_has_it(tmp_path, monkeypatch, capsys):
     assert json.loads(record.read_text())["clocks"]["evt"]["lag_s"] == pytest.approx(0.5, abs=1.5e-3)
     events = [one for text in caught.out.splitlines() if "event" in (one := json.loads(text))]
     assert [one["event"] for one in events if one["event"] == "sensor-clock"] == ["sensor-clock"]
+
+
+def test_a_service_shows_the_clock_of_each_sensor():
+    status = Status("gantry7", 10.0)
+    lived = Lived(both(0.15, "true")[:1300])
+    status.came([scan for _, scan in sensor("rgb", seconds=1.0) + sensor("evt", seconds=1.0)])
+    status.clocks = lived.live.clocks
+    shown = status.health()["sensors"]
+    assert shown["rgb"]["clock"] is None
+    assert shown["evt"]["clock"]["lag_s"] == pytest.approx(0.15, abs=1.5e-3)
