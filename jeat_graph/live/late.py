@@ -25,7 +25,7 @@ from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import ReplayableStep, Rewinding
 from jeat_graph.live.time_base import Decision, TimeBase
-from jeat_graph.live.waiting import Passage, WaitingRoom
+from jeat_graph.live.waiting import Released, WaitingRoom
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
@@ -137,18 +137,20 @@ class LiveTracker:
         batch = [self._on_common_clock(scan) for scan in given]
         self.measured = []
         repeated, new = self._repetition.sort(batch, self._was_taken, given)
-        passage = Passage([new] if new else [], [])
+        released = Released([new] if new else [], [])
         if self._room is not None:
-            passage = self._room.enter(new, self._base.bound_s)
-        admitted = [self._admit(scans) for scans in passage.batches]
+            released = self._room.enter(new, self._base.bound_s)
+        admitted = [self._admit(scans) for scans in released.batches]
         self._repetition.note(given)  # what the tracker refuses has not come
-        for scan in passage.missed:
+        for scan in released.missed:
             self.lateness.add(scan.sensor, max((self.time or 0.0) - scan.t, 0.0), True)
         news = self._clocks.saw(new)
         if news is not None and news.taken_off:
             news.lines.extend(self._wait_for(news))
         waiting = [] if self._room is None else [scan for scan in new if self._room.holds(scan)]
-        return self._arrival(admitted, repeated)._replace(waiting=waiting, missed=passage.missed, clocks=news)
+        return self._arrival(admitted, repeated)._replace(
+            waiting=waiting, missed=released.missed, clocks=news
+        )
 
     def _admit(self, scans: list[Scan]) -> Admitted:
         """Take in scans that need not wait, as far as their times are believed."""

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from jeat_graph.data.detections import Scan
 
 
-class Passage(NamedTuple):
+class Released(NamedTuple):
     """What became of scans that came to where others wait.
 
     Attributes:
@@ -59,7 +59,7 @@ class WaitingRoom:
         """Whether the sensor's scan of that time waits."""
         return any(other.t == scan.t and other.sensor == scan.sensor for other in self._scans)
 
-    def enter(self, scans: Sequence[Scan], bound_s: float) -> Passage:
+    def enter(self, scans: Sequence[Scan], bound_s: float) -> Released:
         """Let scans come in, and those that need not wait any longer go.
 
         Args:
@@ -82,7 +82,7 @@ class WaitingRoom:
         until_s = max(min(self._slow.values()), self._newest_s - self._most_s)
         ready = [scan for scan in self._scans if scan.t <= until_s]
         self._scans = [scan for scan in self._scans if scan.t > until_s]
-        return Passage([*_by_time(ready), *([far] if far else [])], missed)
+        return Released([*_by_time(ready), *([far] if far else [])], missed)
 
     def jumped(self, t: float) -> None:
         """Note that time goes on elsewhere (s)."""

@@ -169,8 +169,7 @@ def test_where_no_scan_may_come_late_others_wait_too(policy):
     assert lived.live.lateness.summary()["evt"].dropped <= 6  # those of the .15 s that had gone by
 
 
-@pytest.mark.parametrize("stop", [900, 1300])
-@pytest.mark.parametrize("arrival", ["stamps", "true"])
+@pytest.mark.parametrize(("arrival", "stop"), [("stamps", 900), ("stamps", 1300), ("true", 900)])
 def test_a_restart_goes_on_with_the_clock_and_gives_the_same(stop, arrival, tmp_path):
     """It is stopped while it compares, after that, and while others wait; the input is given once more."""
     scans = both(2.0, arrival)[:1900]
