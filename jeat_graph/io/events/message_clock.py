@@ -73,47 +73,38 @@ class Stamps(NamedTuple):
         )
 
 
-def by_stamps(dated: Iterator[Dated]) -> Iterator[Dated]:
+def by_stamps(dated: Iterator[Dated], topic: str) -> Iterator[Dated]:
     """Bring the events of messages to the clock of their stamps, where they have another one.
 
     The first event of each message has its stamp, and those between two messages lie between their stamps as
-    they do by the camera's clock; behind the last, the camera's clock leads on. A stamp that is not after the
-    one before is passed over.
+    they do by the camera's clock; behind the last, the camera's clock leads on. Edges of other topics lie
+    among the events as by the camera's clock. A stamp that is not after the one before is passed over.
 
     Args:
-        dated: messages, those of a topic in their order; one of each topic is held back.
+        dated: messages in their order; one is held back.
+        topic: that of the events.
     """
-    waiting: dict[str, list[Dated]] = {}
+    held: list[Dated] = []
+    begin: tuple[int, int] | None = (
+        None  # stamp of the message that is held back, and time of its first event
+    )
     for one in dated:
-        first = one.decoded.first_us
-        held = waiting.get(one.topic)
-        if one.stamp_us is None or first is None or held is None:
-            waiting.setdefault(one.topic, []).append(one)
-            continue
-        stamp, own = _begin(held)
-        if one.stamp_us > stamp and first > own:
-            yield from _moved(held, stamp, own, one.stamp_us - stamp, first - own)
-        elif len(held) < _MOST_HELD:
-            held.append(one)
-            continue
-        else:
-            yield from _moved(held, stamp, own, 1, 1)
-        waiting[one.topic] = [one]
-    for held in waiting.values():
-        stamp, own = _begin(held)
-        yield from _moved(held, stamp, own, 1, 1)
+        own = one.decoded.first_us
+        if one.topic == topic and one.stamp_us is not None and own is not None:
+            if begin is None:
+                begin = one.stamp_us, own
+            elif one.stamp_us > begin[0] and own > begin[1]:
+                yield from _moved(held, begin, one.stamp_us - begin[0], own - begin[1])
+                held, begin = [], (one.stamp_us, own)
+            elif len(held) >= _MOST_HELD:
+                yield from _moved(held, begin, 1, 1)
+                held, begin = [], (one.stamp_us, own)
+        held.append(one)
+    yield from _moved(held, begin or (0, 0), 1, 1)
 
 
-def _begin(held: list[Dated]) -> tuple[int, int]:
-    """Stamp and own time of the first event of what waits (µs)."""
-    for one in held:
-        first = one.decoded.first_us
-        if one.stamp_us is not None and first is not None:
-            return one.stamp_us, first
-    return 0, 0
-
-
-def _moved(held: list[Dated], stamp: int, own: int, length: int, own_length: int) -> Iterator[Dated]:
+def _moved(held: list[Dated], begin: tuple[int, int], length: int, own_length: int) -> Iterator[Dated]:
+    stamp, own = begin
     if abs(stamp - own) <= OTHER_CLOCK_US:
         yield from held
         return

@@ -103,7 +103,9 @@ class RosbagReader(EventReader):
         width, height = self.size_px or (1 << 16, 1 << 16)
         edges: list[Triggers] = []
         dated = self._noted()
-        for _, stamp_us, decoded in by_stamps(dated) if self._by_header else dated:
+        for _, stamp_us, decoded in (
+            by_stamps(dated, self._topic.connections[0].topic) if self._by_header else dated
+        ):
             first_us = decoded.first_us
             if first_us is None:
                 continue

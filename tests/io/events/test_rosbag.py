@@ -14,6 +14,7 @@ from jeat_graph.data.events import EventArray
 from jeat_graph.io.events import words
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.opening import open_events
+from jeat_graph.io.events.trigger_times import times_by_triggers, trigger_choice
 
 from .plain import random_evt3, read_evt3
 
@@ -241,14 +242,17 @@ def test_packets_of_the_old_kind_are_read_with_the_topic_of_their_triggers(tmp_p
             message = packet(store, version, encoding, data.tobytes(), SECOND + 0.25, base, kind)
             raw = store.serialize_ros1(message, kind) if version == 1 else store.serialize_cdr(message, kind)
             bag.write(bag.add_connection(topic, kind, typestore=store), SECOND * 10**9, raw)
-    with open_events(path) as reader:
-        found, triggers = [], []
-        for piece in reader.pieces():
-            found += rows(piece)
-            triggers += list(zip(*(column.tolist() for column in reader.triggers), strict=True))
-    # The stamp says when the first event was: .25 s after a whole second.
-    assert found == [(250_000 + 2 * k, k, k + 1, k % 2) for k in range(10)]
-    assert triggers == [(250_001, 3, 1), (250_009, 3, 0)]
+    for clock in ("sensor", "header"):  # there is one message of each topic: the same
+        with open_events(path, layout=EventLayout(clock=clock)) as reader:
+            found, triggers = [], []
+            for piece in reader.pieces():
+                found += rows(piece)
+                triggers += list(zip(*(column.tolist() for column in reader.triggers), strict=True))
+        # The stamp says when the first event was: .25 s after a whole second.
+        assert found == [(250_000 + 2 * k, k, k + 1, k % 2) for k in range(10)]
+        assert triggers == [(250_001, 3, 1), (250_009, 3, 0)]
+    times, _ = times_by_triggers(path, trigger_choice("triggers:3:fall"))(1)
+    assert times == pytest.approx([0.250009])
 
 
 def test_triggers_among_the_words_of_evt3_are_counted(tmp_path, capsys):
@@ -399,3 +403,22 @@ def test_other_files_have_no_two_clocks(tmp_path):
     path.write_bytes(b"% evt 2.0\n% geometry 8x8\n% end\n")
     with pytest.raises(DataError, match="is EVT2, where --event-clock says nothing"):
         open_events(path, layout=EventLayout(clock="header"))
+
+
+def test_edges_of_a_topic_of_their_own_lie_among_the_events(tmp_path):
+    """Their own messages' stamps say when these were sent, not when the signal rose."""
+    from rosbags.rosbag2 import Writer
+
+    store, kind = store_of(2), "event_camera_msgs/msg/EventPacket"
+    words = np.array([(k * 1_000_000) | 5 << 32 | 6 << 48 for k in range(3)], "<u8").tobytes()
+    edge = np.array([5_000_000 | 3 << 48 | 1 << 63], "<u8").tobytes()  # half way between the messages
+    coming = [("/cam/events", "mono", words, 0.5, 0), ("/cam/trigger", "trigger", edge, 0.9, 0)]
+    coming += [("/cam/events", "mono", words, 0.52, 10**7)]  # 10 ms by the camera's clock, 20 by stamps
+    with Writer(tmp_path / "bag", version=9) as bag:
+        topics = {name: bag.add_connection(name, kind, typestore=store) for name, *_ in coming[:2]}
+        for k, (name, encoding, data, stamp, base) in enumerate(coming):
+            message = packet(store, 2, encoding, data, SECOND + stamp, base)
+            bag.write(topics[name], SECOND * 10**9 + k, store.serialize_cdr(message, kind))
+    with open_events(tmp_path / "bag", layout=EventLayout(clock="header")) as reader:
+        edges = [int(t) for _ in reader.pieces() for t in reader.triggers.t_us]
+    assert edges == [pytest.approx(510_000, abs=1)]

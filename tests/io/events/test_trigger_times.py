@@ -208,7 +208,7 @@ def test_options_that_contradict_are_refused(raw, video, tmp_path, fails):
     assert "DETECTIONS have their own times" in fails("track", table, *given, "--out", tmp_path / "run")
 
 
-def test_triggers_of_aedat4_begin_and_end_what_they_stand_for(tmp_path):
+def test_triggers_of_aedat4_begin_and_end_what_they_stand_for(tmp_path, capsys):
     """Kinds 8 and 9, an exposure's begin and end, are one channel; written by iniVation's own library."""
     pytest.importorskip("aedat", reason="pip install 'aedat>=2.2,<3'")
     dv = pytest.importorskip("dv_processing", reason="pip install dv-processing")
@@ -228,6 +228,12 @@ def test_triggers_of_aedat4_begin_and_end_what_they_stand_for(tmp_path):
     del writer
     with open_events(path) as reader:
         assert reader.origin_us == begin
+    # What leads to the clock of the file is shown, and kept.
+    assert main(["events", "info", str(path)]) == 0
+    assert "clock: time 0 is 1700000000.000000 s" in capsys.readouterr().out
+    assert main(["events", "convert", str(path), str(tmp_path / "w.raw")]) == 0
+    with open_events(tmp_path / "w.raw") as reader:
+        assert reader.t_offset_us == begin
     times, _ = times_by_triggers(path, trigger_choice("triggers:8"))(10)
     np.testing.assert_allclose(times, 0.04 * np.arange(10))
     times, _ = times_by_triggers(path, trigger_choice("triggers:8:fall"))(10)
