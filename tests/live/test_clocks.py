@@ -18,6 +18,7 @@ from jeat_graph.io.streams.scan_batch import ScanBatch
 from jeat_graph.live.clock_watch import ClockWatch
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import ScanMessage
+from jeat_graph.live.service.metrics import Metrics
 from jeat_graph.live.service.status import Status
 from jeat_graph.live.session import Ends, Session
 from jeat_graph.tracking.tracker import Tracker
@@ -322,3 +323,7 @@ def test_a_service_shows_the_clock_of_each_sensor():
     shown = status.health()["sensors"]
     assert shown["rgb"]["clock"] is None
     assert shown["evt"]["clock"]["lag_s"] == pytest.approx(0.15, abs=1.5e-3)
+    pytest.importorskip("prometheus_client", reason="pip install 'prometheus-client>=0.21,<1'")
+    text = Metrics(status).text().decode()
+    assert f'jeat_graph_sensor_clock_lag_seconds{{sensor="evt"}} {shown["evt"]["clock"]["lag_s"]}' in text
+    assert 'lag_seconds{sensor="rgb"}' not in text
