@@ -12,9 +12,12 @@ if TYPE_CHECKING:
     from jeat_graph.detection.request import DetectRequest
     from jeat_graph.detection.settings import DetectionSettings
     from jeat_graph.io.events.layout import EventLayout
+    from jeat_graph.io.events.trigger_times import TriggerChoice
 
 #: Units of time of tables of events.
 UNITS = ("s", "ms", "us", "ns")
+#: Clocks of a bag's events (`io.events.layout.CLOCKS`).
+CLOCKS = ("sensor", "header")
 #: The preset of who names none.
 DEFAULT = "default"
 #: What is no network, or not one that is known before the pictures are.
@@ -47,6 +50,7 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         "instead of the other two; either may be missing",
     )
     add_looking(parser)
+    add_frame_times(parser)
     add(
         "--event-rate",
         type=positive,
@@ -61,6 +65,28 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         metavar="S",
         help="what to add to the events' times for the clock of the frames (default: 0)",
     )
+
+
+def add_frame_times(parser: argparse._ActionsContainer) -> None:
+    """Declare that the events' triggers may say when the frames were taken."""
+    parser.add_argument(
+        "--frame-times",
+        metavar="triggers[:CHANNEL][:fall]",
+        help="each frame was taken when a trigger in --events rose, or fell, one a frame: triggers (the only "
+        "channel that has as many), triggers:0, triggers:0:fall; `events info` counts them (default: as the "
+        "frames say)",
+    )
+
+
+def frame_times(args: argparse.Namespace) -> TriggerChoice | None:
+    """Return which triggers say when frames were taken, or None.
+
+    Raises:
+        ConfigError: nothing that can say it.
+    """
+    from jeat_graph.io.events.trigger_times import trigger_choice
+
+    return None if args.frame_times is None else trigger_choice(args.frame_times)
 
 
 def add_looking(parser: argparse._ActionsContainer) -> None:
@@ -120,6 +146,12 @@ def add_event_layout(parser: argparse._ActionsContainer, *names_of_size: str) ->
         metavar="NAME",
         help="which events of a file with several: topic of a bag, group of HDF5, file of an archive",
     )
+    add(
+        "--event-clock",
+        choices=CLOCKS,
+        help="times of a bag's events: by the camera's own clock from the first message's stamp on (sensor, "
+        "default), or by the stamps in the headers of all messages; `events info` shows both",
+    )
 
 
 def event_layout(args: argparse.Namespace) -> EventLayout:
@@ -135,6 +167,7 @@ def event_layout(args: argparse.Namespace) -> EventLayout:
         columns=None if columns is None else tuple(name.strip() for name in columns.split(",")),
         time_unit=args.event_time_unit,
         stream=args.event_stream,
+        clock=args.event_clock,
     )
 
 
@@ -187,6 +220,8 @@ def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
         "--event-columns": ("--events", args.events, args.event_columns is not None),
         "--event-time-unit": ("--events", args.events, args.event_time_unit is not None),
         "--event-stream": ("--events", args.events, args.event_stream is not None),
+        "--event-clock": ("--events", args.events, args.event_clock is not None),
+        "--frame-times": ("--events", args.events, args.frame_times is not None),
         "--event-delay": ("--events", args.events, args.event_delay != 0.0),
     }
     return [(name, source) for name, (source, file, said) in given.items() if said and file is None]
@@ -258,6 +293,7 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
         detector_events=args.detector_events,
         detector_fused=args.detector_fused,
         rate_hz=args.rate,
+        frame_times=frame_times(args),
         event_size_px=args.event_size,
         event_layout=event_layout(args),
         events_later_s=args.event_delay,

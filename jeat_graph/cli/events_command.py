@@ -47,7 +47,13 @@ def run(args: argparse.Namespace) -> int:
 
             with _bar() as bar:
                 found = summarise(reader, bar.update)
-            numbers = {**found._asdict(), "rate_hz": found.rate_hz, "damage": asdict(reader.damage)}
+            numbers = {
+                **found._asdict(),
+                "rate_hz": found.rate_hz,
+                "damage": asdict(reader.damage),
+                "edges": {channel: one._asdict() for channel, one in found.edges.items()},
+                "stamps": None if found.stamps is None else found.stamps._asdict(),
+            }
             print(json.dumps(numbers, indent=2) if args.json else "\n".join(found.lines()))
             return 0
         out = Path(args.out)

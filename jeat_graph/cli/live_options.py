@@ -103,7 +103,15 @@ def stream_request(args: argparse.Namespace) -> DetectRequest | None:
 def _detect_request(args: argparse.Namespace) -> DetectRequest:
     from jeat_graph.cli.detect_options import detect_request
 
-    without = {"event_size": None, "event_columns": None, "event_time_unit": None, "event_stream": None}
+    of_files = (
+        "event_size",
+        "event_columns",
+        "event_time_unit",
+        "event_stream",
+        "event_clock",
+        "frame_times",
+    )
+    without: dict[str, None] = dict.fromkeys(of_files)
     others = {"event_rate": None, "event_delay": 0.0, "rate": None}
     detectors = {
         "detector_frames": args.detector_frames or "auto",

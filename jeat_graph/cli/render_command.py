@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.detect_options import add_event_layout, event_layout
+from jeat_graph.cli.detect_options import add_event_layout, add_frame_times, event_layout, frame_times
 from jeat_graph.cli.options import (
     add_classes,
     add_old_name,
@@ -51,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="events (every format of `events info`) to draw on; beside the frames if both",
     )
     add_event_layout(parser)
+    add_frame_times(parser)
     add_places(parser)
     add(
         "--show",
@@ -137,6 +138,7 @@ def run(args: argparse.Namespace) -> int:
         reading=tables_read(args),
         event_size_px=args.event_size,
         event_layout=event_layout(args),
+        frame_times=frame_times(args),
         rig=_path(args.rig),
         captions=PARTS if args.show is None else tuple(args.show),
         road=_path(args.road),

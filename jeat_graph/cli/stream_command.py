@@ -236,7 +236,9 @@ def _with_road(
     def both(t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:
         tracks(t, table, message, late_s)
         for when, measured in live.measured:  # sensors of other delays are steps of their own
-            road.take(when, measured, table.track_id)
+            if when <= t:
+                road.take(when, measured, table.track_id)
+        live.measured = [one for one in live.measured if one[0] > t]
 
     return both
 

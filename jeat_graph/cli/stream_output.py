@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from typing import TYPE_CHECKING
 
@@ -49,8 +48,8 @@ class StreamOutput:
             self._say(csv_header(classes))
 
     def event(self, event: HealthChange) -> None:
-        """Say on the output, too, that a sensor fails or is well again."""
-        line = json.dumps({"t": event.t, "event": f"sensor-{event.what}", "sensor": event.sensor}) + "\n"
+        """Say on the output, too, that a sensor fails or is well again, or that its clock was found."""
+        line = event.line() + "\n"
         if self._sink is not None:
             from jeat_graph.live.messages import encode_tracks
 

@@ -96,6 +96,8 @@ def run(args: argparse.Namespace) -> int:
         raise DataError("--duration is of cameras that are on; DETECTIONS are read to their end")
     if args.detections and args.events is not None:
         raise DataError("--events is detected in where no DETECTIONS are given; give one or the other")
+    if args.detections and args.frame_times is not None:
+        raise DataError("--frame-times is of frames to detect in; DETECTIONS have their own times")
     from jeat_graph.io.files.addresses import is_live
     from jeat_graph.runs.run_options import RunOptions
     from jeat_graph.runs.track_files import TrackRequest, track_files

@@ -14,6 +14,12 @@ class LiveConfig(Section):
     late_s: float = number(
         0.3, "s", "a scan may come so late and still be put where it belongs; sensors may have their own"
     )
+    wait_s: float = number(
+        15.0,
+        "s",
+        "answers wait up to so long for a sensor whose clock was found while running, and whose scans come "
+        "too late to go back for; 0 passes such scans over",
+    )
     jump_s: float = number(
         5.0,
         "s",

@@ -106,7 +106,8 @@ class InputConfig(Section):
         "find",
         ("as_given", "find"),
         "times are believed, or clocks that differ are found in a pass over the whole recording before it is "
-        "tracked (`rig.agreement`), and brought together where the boxes leave no doubt",
+        "tracked (`rig.agreement`), live while scans come (`live.clock_watch`), and brought together where "
+        "the boxes leave no doubt",
     )
     picture: str = choice(
         "seen",

@@ -20,6 +20,7 @@ import numpy as np
 from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.detection.frame_source import frames_of
 from jeat_graph.detection.known_networks import KNOWN
 from jeat_graph.detection.models.pictures import ModelPictureDetector
 from jeat_graph.detection.named import AUTO, FRAMES, MOTION, networks
@@ -28,7 +29,7 @@ from jeat_graph.detection.opencv_threads import one_thread
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import DetectionSettings, PictureSettings
-from jeat_graph.io.media.video import FrameSource, RgbImage, open_frames
+from jeat_graph.io.media.video import FrameSource, RgbImage
 
 #: The network of the package that is tried: it knows highways.
 HIGHWAYS = "sehn"
@@ -90,7 +91,7 @@ def resolved(request: DetectRequest, say: Callable[[str], object] = lambda _: No
         return replace(request, detector_frames=MOTION)
     with ExitStack() as stack:
         stack.enter_context(one_thread())
-        source = stack.enter_context(open_frames(request.frames, request.rate_hz))
+        source = stack.enter_context(frames_of(request))
         return replace(request, detector_frames=chosen_by(*_first(source), request.settings, say))
 
 

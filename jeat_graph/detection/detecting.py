@@ -19,6 +19,7 @@ from jeat_graph.detection.automatic import resolved
 from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.burnt_in import find_clock
 from jeat_graph.detection.event_detector import EventDetector
+from jeat_graph.detection.frame_source import frames_of
 from jeat_graph.detection.masks import MaskedPicture
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.opencv_threads import one_thread
@@ -128,10 +129,7 @@ def detect_files(
 
 
 def _frames(request: DetectRequest, stack: ExitStack, say: Callable[[str], object]) -> FrameSource:
-    from jeat_graph.io.media.video import open_frames
-
-    assert request.frames is not None
-    source = stack.enter_context(open_frames(request.frames, request.rate_hz))
+    source = stack.enter_context(frames_of(request))
     width, height = source.size_px
     say(f"frames: {len(source)} of {width} x {height} px, {request.frames}")
     say(f"times of the frames: {source.clock}")
@@ -269,6 +267,9 @@ def _events(
     reader.labels = False
     width, height = reader.needed_size(beside_px=None if source is None else source.size_px)
     say(f"events: {reader.format_name} of {width} x {height} px, {request.events}")
+    if request.frame_times is not None:  # the times of the frames are the events' own
+        reader.t_offset_us = 0
+        return reader, (width, height)
     clock = None if source is None else FrameClock(float(source.times_s[0]), source.origin_s)
     reader.t_offset_us, said = events_later_us(reader.t_offset_us, reader.origin_us, clock)
     if said:

@@ -10,9 +10,11 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.masks import Masks
 from jeat_graph.detection.named import AUTO, MOTION
 from jeat_graph.detection.settings import DetectionSettings
+from jeat_graph.io.files.addresses import is_live
 
 if TYPE_CHECKING:
     from jeat_graph.io.events.layout import EventLayout
+    from jeat_graph.io.events.trigger_times import TriggerChoice
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class DetectRequest:
         detector_frames: `motion`, a network with a name, an ONNX file, or `auto` (`automatic.resolved`).
         detector_events: the same.
         detector_fused: a network that looks at both at once, instead of the other two; or None.
+        frame_times: edges of the events' triggers that say when frames were taken; None: as the frames say.
         rate_hz: frames per second where neither the video nor a table beside it says.
         event_size_px: width and height of the event camera's picture, where the file does not say.
         event_layout: columns, unit of time and recording, where the file of events leaves that open.
@@ -42,6 +45,7 @@ class DetectRequest:
     detector_events: str = MOTION
     detector_fused: str | None = None
     rate_hz: float | None = None
+    frame_times: TriggerChoice | None = None
     event_size_px: tuple[int, int] | None = None
     event_layout: EventLayout | None = None
     events_later_s: float = 0.0
@@ -54,9 +58,19 @@ class DetectRequest:
     def __post_init__(self) -> None:
         if self.frames is None and self.events is None:
             raise ConfigError("nothing to detect in: give --frames, --events or both")
+        if self.frame_times is not None:
+            self._check_frame_times()
         others = {self.detector_frames, self.detector_events}
         if self.detector_fused is not None and not others <= {AUTO, MOTION}:
             raise ConfigError("--detector-fused takes the place of --detector-frames and --detector-events")
+
+    def _check_frame_times(self) -> None:
+        if self.frames is None or self.events is None:
+            raise ConfigError("--frame-times triggers are those of the events: give --frames and --events")
+        if self.rate_hz is not None:
+            raise ConfigError("--rate and --frame-times both say when frames were taken: leave one out")
+        if any(map(is_live, (self.frames, self.events))):
+            raise ConfigError("--frame-times is of recordings, not of cameras that are on")
 
     @property
     def detectors(self) -> tuple[str, ...]:

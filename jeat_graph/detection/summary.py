@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.events import EventArray
 from jeat_graph.detection.noise import NoiseFilter, NoiseSettings
-from jeat_graph.io.events.reader import EventReader
+from jeat_graph.io.events.message_clock import Stamps
+from jeat_graph.io.events.reader import EventReader, Triggers
+from jeat_graph.io.events.trigger_times import EdgeCounts, count_edges
 
 _US_PER_S = 1e6
 #: Side of the picture that is assumed while the file's is not known (px).
@@ -33,6 +35,8 @@ class EventSummary(NamedTuple):
         hottest_hz: rate of the pixel with most events (Hz).
         notes: what was wrong with the file, one line each.
         origin_s: time 0 on the clock of the file (s), where it says one.
+        edges: of the triggers, by channel, how many rose and how many fell.
+        stamps: what the stamps of messages and the camera's own clock say, where the file has both.
     """
 
     format_name: str
@@ -48,6 +52,8 @@ class EventSummary(NamedTuple):
     hottest_hz: float
     notes: list[str]
     origin_s: float = 0.0
+    edges: Mapping[str, EdgeCounts] = {}
+    stamps: Stamps | None = None
 
     @property
     def rate_hz(self) -> float:
@@ -67,7 +73,12 @@ class EventSummary(NamedTuple):
             f"rate: {self.rate_hz / _US_PER_S:.4g} million events/s",
             f"noise: {self.noise_hz_px:.3g} Hz/px stand alone",
             f"hot pixels: {self.hot_pixels}; the most active one fires at {self.hottest_hz:.4g} Hz",
+            *([self.stamps.line()] if self.stamps else []),
             f"triggers: {self.triggers}",
+            *(
+                f"triggers of channel {channel}: {one.rising} rise, {one.falling} fall"
+                for channel, one in self.edges.items()
+            ),
             *(f"note: {note}" for note in self.notes),
         ]
 
@@ -85,10 +96,11 @@ def summarise(reader: EventReader, advance: Callable[[int], object] = lambda _: 
     size = reader.size_px or (_LARGEST, _LARGEST)
     noise = NoiseFilter(size, NoiseSettings())
     counts = np.zeros(size[0] * size[1], dtype=np.int64)
-    events = on = triggers = 0
+    events = on = 0
+    edges: list[Triggers] = []
     first = last = None
     for piece in reader.pieces():
-        triggers += len(reader.triggers.t_us)
+        edges.append(reader.triggers)
         if reader.size_px is None:
             piece = _within(piece, reader)
         if not len(piece):
@@ -110,7 +122,7 @@ def summarise(reader: EventReader, advance: Callable[[int], object] = lambda _: 
         size_px=shown,
         size_known=known,
         events=events,
-        triggers=triggers,
+        triggers=sum(len(part.t_us) for part in edges),
         first_s=(first or 0) / _US_PER_S,
         duration_s=duration_s,
         share_on=on / events if events else 0.0,
@@ -119,6 +131,8 @@ def summarise(reader: EventReader, advance: Callable[[int], object] = lambda _: 
         hottest_hz=float(counts.max()) * per_second,
         notes=reader.damage.notes(),
         origin_s=(reader.origin_us + reader.t_offset_us) / _US_PER_S,
+        edges=count_edges(Triggers.joined(edges)),
+        stamps=reader.stamps,
     )
 
 

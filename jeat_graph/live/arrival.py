@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.clock_watch import ClockNews
+from jeat_graph.live.time_base import Decision
 from jeat_graph.tracking.tracker import Tracker
 
 
@@ -24,6 +26,10 @@ class Arrival(NamedTuple):
         anew: whether time has begun anew, because all scans were too late for long: all tracks have ended.
         leapt: whether time goes on much later, because scans ahead of time confirmed each other.
         taken: the scans that were taken, those that had waited too; times without the sensors' latency.
+        waiting: those that wait for a sensor whose scans come later (`live.wait_s`).
+        missed: those of such a sensor from before the time that had been reached when that was found.
+        earlier: what was reported at times that had waited: time (s), table, how late (s), one after another.
+        clocks: what is known of the sensors' clocks from now on.
     """
 
     table: Trajectories
@@ -36,6 +42,33 @@ class Arrival(NamedTuple):
     anew: bool
     leapt: bool = False
     taken: Sequence[Scan] = ()
+    waiting: Sequence[Scan] = ()
+    missed: Sequence[Scan] = ()
+    earlier: Sequence[tuple[float, Trajectories, float]] = ()
+    clocks: ClockNews | None = None
+
+
+class Admitted(NamedTuple):
+    """What became of scans that were let in to the tracker together.
+
+    Attributes:
+        scans: they.
+        decision: what was decided.
+        taken: by time.
+        t: time of the newest step after that (s).
+        table: the tracks that are reported then.
+    """
+
+    scans: list[Scan]
+    decision: Decision
+    taken: list[Taken]
+    t: float
+    table: Trajectories
+
+    @property
+    def late_s(self) -> float:
+        """How much older the scans were than the newest before them (s)."""
+        return max((one.late_s for one in self.taken), default=0.0)
 
 
 class Taken(NamedTuple):

@@ -8,14 +8,15 @@ to say so: by what is usual of the sensor itself, as a slow mean over the time i
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.detections import Scan
 from jeat_graph.tracking.sensor_state import SensorState
 
-SILENT, BACK, RUBBISH, WELL = "silent", "back", "rubbish", "well"
+SILENT, BACK, RUBBISH, WELL, CLOCK = "silent", "back", "rubbish", "well", "clock"
 #: So many times its usual clutter, or noise variance, is rubbish; half of it is well again.
 CLUTTER_FACTOR, NOISE_FACTOR, AGAIN = 5.0, 4.0, 0.5
 #: So is a sensor whose finds are real with no more than this probability; twice that is well again.
@@ -32,14 +33,22 @@ class HealthChange(NamedTuple):
     Attributes:
         t: time of the newest scan (s).
         sensor: its name.
-        what: `silent`, `back`, `rubbish` or `well`.
+        what: `silent`, `back`, `rubbish`, `well` or `clock`.
         text: one sentence.
+        numbers: what belongs to it.
     """
 
     t: float
     sensor: str
     what: str
     text: str
+    numbers: Mapping[str, float] = {}
+
+    def line(self) -> str:
+        """Return it as JSON."""
+        return json.dumps(
+            {"t": self.t, "event": f"sensor-{self.what}", "sensor": self.sensor, **self.numbers}
+        )
 
 
 class SensorHealth:

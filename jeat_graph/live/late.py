@@ -19,11 +19,13 @@ from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.live.arrival import Arrival, Taken, looked_last
+from jeat_graph.live.arrival import Admitted, Arrival, Taken, looked_last
+from jeat_graph.live.clock_watch import ClockNews, ClockWatch
 from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import ReplayableStep, Rewinding
 from jeat_graph.live.time_base import Decision, TimeBase
+from jeat_graph.live.waiting import Released, WaitingRoom
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
@@ -35,6 +37,8 @@ from jeat_graph.tracking.tracker import Tracker
 REWIND, SKIP, REFUSE = "rewind", "skip", "refuse"
 #: A difference of two times is only so exact (s).
 _ROUNDING_S = 1e-6
+#: So much longer than a slow sensor usually needs its scans are waited for (s).
+_JITTER_S = 0.5
 POLICIES = (REWIND, SKIP, REFUSE)
 
 
@@ -83,6 +87,8 @@ class LiveTracker:
         # Of a tracker that has taken scans: to before its time nobody can go back.
         self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
         self._common = CommonPicture.of(config)
+        self._clocks = ClockWatch(config)
+        self._room: WaitingRoom | None = None
         # Of the sensors that are declared or have been met: known delay of their times, most lateness (s).
         self._latency: dict[str, float] = {}
         self._late_s: dict[str, float] = {}
@@ -101,6 +107,11 @@ class LiveTracker:
         return self._rewinding.steps
 
     @property
+    def clocks(self) -> dict[str, dict[str, float]]:
+        """What was found of the sensors' clocks and is taken off their times: `lag_s`, `std_s`, `at_s`."""
+        return self._clocks.clocks
+
+    @property
     def replayed(self) -> int:
         """How many steps have been taken again so far."""
         return self._rewinding.replayed
@@ -114,7 +125,7 @@ class LiveTracker:
 
         Args:
             scans: as `Tracker.step`; their times are the measurement's own, but for the sensor's `latency_s`
-                and `clock`.
+                and `clock`, and for what is found of its clock while scans come (`clocks`).
 
         Raises:
             DataError, UnknownSensorError: as `Tracker.step`; the state is as before.
@@ -122,35 +133,86 @@ class LiveTracker:
         """
         given = as_scans(scans)
         self._meet(given)  # sensors are refused before anything is done
-        batch = [self._corrected(self._common.scan(scan)) for scan in given]
+        given = [self._corrected(self._common.scan(scan)) for scan in given]
+        batch = [self._on_common_clock(scan) for scan in given]
         self.measured = []
+        repeated, new = self._repetition.sort(batch, self._was_taken, given)
+        released = Released([new] if new else [], [])
+        if self._room is not None:
+            released = self._room.enter(new, self._base.bound_s)
+        admitted = [self._admit(scans) for scans in released.batches]
+        self._repetition.note(given)  # what the tracker refuses has not come
+        for scan in released.missed:
+            self.lateness.add(scan.sensor, max((self.time or 0.0) - scan.t, 0.0), True)
+        news = self._clocks.saw(new)
+        if news is not None and news.taken_off:
+            news.lines.extend(self._wait_for(news))
+        waiting = [] if self._room is None else [scan for scan in new if self._room.holds(scan)]
+        return self._arrival(admitted, repeated)._replace(
+            waiting=waiting, missed=released.missed, clocks=news
+        )
+
+    def _admit(self, scans: list[Scan]) -> Admitted:
+        """Take in scans that need not wait, as far as their times are believed."""
         before = self.tracker.time
-        repeated, new = self._repetition.sort(batch, self._was_taken)
-        decision = Decision([], [])
-        if new:
-            decision = self._decide(new)
+        decision = self._decide(scans)
         taken = self._take_all(decision.take)
-        self._repetition.note(batch)  # what the tracker refuses has not come
         self.lateness.arrived(taken, decision.refuted, before)
         self._hand_over()
-        good = [scan for one in taken for scan in one.good]
-        if good and not (decision.leapt or decision.anew):
+        if any(one.good for one in taken) and not (decision.leapt or decision.anew):
             self._base.took(before, self.tracker.time)
+        return Admitted(scans, decision, taken, self.tracker.time or 0.0, self._answer())
+
+    def _answer(self) -> Trajectories:
         table = self.tracker.causal()
-        if self.policy == REWIND:
-            table = self._rewinding.identities.answer(table)
+        return self._rewinding.identities.answer(table) if self.policy == REWIND else table
+
+    def _arrival(self, admitted: list[Admitted], repeated: list[Scan]) -> Arrival:
+        taken = [one for part in admitted for one in part.taken]
+        decisions = [part.decision for part in admitted]
         return Arrival(
-            table,
+            admitted[-1].table if admitted else self._answer(),
             self.tracker.time or 0.0,
-            late_s=max((one.late_s for one in taken), default=0.0),
+            late_s=admitted[-1].late_s if admitted else 0.0,
             dropped=[scan for one in taken for scan in one.dropped],
             repeated=repeated,
-            held=[] if decision.take else new,
-            refuted=decision.refuted,
-            anew=decision.anew,
-            leapt=decision.leapt,
-            taken=good,
+            held=[scan for part in admitted if not part.decision.take for scan in part.scans],
+            refuted=[scan for one in decisions for scan in one.refuted],
+            anew=any(one.anew for one in decisions),
+            leapt=any(one.leapt for one in decisions),
+            taken=[scan for one in taken for scan in one.good],
+            earlier=[(part.t, part.table, part.late_s) for part in admitted[:-1] if part.taken],
         )
+
+    def _wait_for(self, news: ClockNews) -> list[str]:
+        """Have scans wait for sensors whose clocks were found, and whose scans come too late to go back."""
+        newest = {
+            name: t - (news.taken_off[name].lag_s if name in news.taken_off else 0.0)
+            for name, t in news.newest.items()
+        }
+        behind = {name: max(newest.values()) - t for name, t in newest.items()}
+        back_s = self._back_s()
+        slow = {name: newest[name] for name in news.taken_off if behind[name] > back_s}
+        if not slow:
+            return []
+        names = ", ".join(repr(name) for name in sorted(slow))
+        late_s, most_s = max(behind[name] for name in slow), self.tracker.config.live.wait_s
+        if late_s > most_s:
+            return [
+                f"scans of {names} come {late_s:.2f} s later than others of the same time, which is more "
+                f"than answers wait (live.wait_s is {most_s:g}): they are passed over"
+            ]
+        begun_s = -math.inf if self.time is None else self.time
+        room = WaitingRoom(slow, late_s + _JITTER_S, begun_s, back_s)
+        self._room = room if self._room is None else room.beside(self._room)
+        return [
+            f"scans of {names} come {late_s:.2f} s later than others of the same time: from now on answers "
+            "wait for them (--set live.wait_s=0 passes them over instead)"
+        ]
+
+    def _back_s(self) -> float:
+        """How far the tracker goes back for any sensor (s)."""
+        return min(self._late_s.values(), default=0.0) if self.policy == REWIND else 0.0
 
     def _take_all(self, batch: list[Scan]) -> list[Taken]:
         """Take in scans of any times, all or none."""
@@ -178,6 +240,9 @@ class LiveTracker:
         decision = self._base.decide(batch, now, late, last_look)
         if decision.leapt or decision.anew:
             self._repetition.begins()
+            if self._room is not None:  # what waits is of the time before
+                self._take_all(self._room.clear())
+                self._room.jumped(t)
         if decision.anew:
             self._rewinding.settle(math.inf)
             self._rewinding.settled, self._newest, self._begun = -math.inf, [], (-math.inf, [])
@@ -205,6 +270,8 @@ class LiveTracker:
             "base": self._base.state() | self._repetition.state(),
             "newest": self._newest,
             "lateness": self.lateness.state(),
+            "clocks": self._clocks.state(),
+            "waiting": None if self._room is None else self._room.state(),
             "more": more or {},
         }
         save_state(path, self.tracker.config, state)
@@ -230,7 +297,12 @@ class LiveTracker:
             live.lateness.set_state(state["lateness"])
             live._rewinding.set_state(state["rewinding"])
             live._base.set_state(state["base"])
-            live._repetition.set_state(state["base"], live.tracker.time)
+            live._clocks.set_state(state["clocks"])
+            newest = live.tracker.time
+            if state["waiting"] is not None:
+                live._room = WaitingRoom.of_state(state["waiting"])
+                newest = live._room.newest_s
+            live._repetition.set_state(state["base"], newest)
             return live, state["more"]
 
     def predict(self, t: float) -> Prediction:
@@ -244,8 +316,12 @@ class LiveTracker:
     def finish(self) -> Trajectories:
         """End all tracks and return the smoothed rows not drained yet (see `Tracker.finish`).
 
-        Scans ahead of time that wait are taken: nothing comes any more that could prove them wrong.
+        Scans that wait are taken, those ahead of time too: nothing comes any more that could prove them
+        wrong.
         """
+        if self._room is not None:
+            self._take_all(self._room.clear())
+            self._hand_over()
         held = self._base.clear()
         if held and self.tracker.time is not None and min(scan.t for scan in held) > self.tracker.time:
             self._take_all(held)
@@ -273,6 +349,11 @@ class LiveTracker:
         latency = self._latency[scan.sensor]
         return replace(scan, t=scan.t - latency) if latency else scan
 
+    def _on_common_clock(self, scan: Scan) -> Scan:
+        """Take off a scan's time what was found of its sensor's clock."""
+        lag_s = self._clocks.lag_s(scan.sensor)
+        return replace(scan, t=scan.t - lag_s) if lag_s else scan
+
     def _take(self, batch: list[Scan]) -> Taken:
         """Take in scans of one time, but those that are to be passed over."""
         t, now = batch[0].t, self.tracker.time
@@ -294,6 +375,8 @@ class LiveTracker:
 
     def _was_taken(self, scan: Scan) -> bool:
         """Whether a scan of that sensor and of that time, which is not after the newest, has been taken."""
+        if self._room is not None and self._room.holds(scan):
+            return True
         if self.policy != REWIND:
             return (self.time is not None and scan.t < self.time) or scan.sensor in self._newest
         return scan.t <= self._rewinding.settled or self._rewinding.knows(scan)

@@ -38,23 +38,29 @@ class Repetition:
         self.until: float | None = None
         self.first: float | None = None
 
-    def sort(self, scans: Sequence[Scan], was_taken: Callable[[Scan], bool]) -> tuple[list[Scan], list[Scan]]:
+    def sort(
+        self,
+        scans: Sequence[Scan],
+        was_taken: Callable[[Scan], bool],
+        given: Sequence[Scan] | None = None,
+    ) -> tuple[list[Scan], list[Scan]]:
         """Sort scans into those that come again and those that are new.
 
         Args:
             scans: of one message.
             was_taken: whether the tracker has taken a scan of that sensor and of a time up to `until`.
+            given: the same with their sensors' own times, where others were found meanwhile.
         """
         again: list[Scan] = []
         new: list[Scan] = []
-        for scan in scans:
-            (again if self._comes_again(scan, was_taken) else new).append(scan)
+        for scan, as_given in zip(scans, scans if given is None else given, strict=True):
+            (again if self._comes_again(scan, as_given, was_taken) else new).append(scan)
         if again:  # what was passed over before the restart is so once more
             del self._base.row[self._kept :]
         return again, new
 
     def note(self, scans: Sequence[Scan]) -> None:
-        """Take note of scans that have come."""
+        """Take note of scans that have come, with their sensors' own times."""
         for scan in scans:
             self._memory.note(fingerprint_of(scan))
 
@@ -64,10 +70,10 @@ class Repetition:
         if first is not None:
             self.first = first
 
-    def _comes_again(self, scan: Scan, was_taken: Callable[[Scan], bool]) -> bool:
+    def _comes_again(self, scan: Scan, given: Scan, was_taken: Callable[[Scan], bool]) -> bool:
         if self.until is None:
             return False
-        known = self._memory.knows(fingerprint_of(scan))
+        known = self._memory.knows(fingerprint_of(given))
         if known:
             self._never = 0
             return True

@@ -13,8 +13,9 @@ from jeat_graph.config.reading import config_to_dict
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError, UnknownSensorError
 from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.clock_watch import ClockNews
 from jeat_graph.live.counts import Counts, count_lines
-from jeat_graph.live.health import HealthChange, SensorHealth
+from jeat_graph.live.health import CLOCK, HealthChange, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
 from jeat_graph.live.told import Told
@@ -150,7 +151,8 @@ class Session:
         if self.live.tracker.config is not config:
             for text in self._health.know(self.live.tracker.config):
                 self.ends.warn(text)
-        unanswered = len(arrival.dropped) + len(arrival.repeated) + len(arrival.held)
+        untaken = (arrival.dropped, arrival.repeated, arrival.held, arrival.waiting, arrival.missed)
+        unanswered = sum(map(len, untaken))
         if len(arrival.repeated) == len(message.batch.scans):
             self._passed_again(message, place)
             return
@@ -162,10 +164,14 @@ class Session:
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
         with self._owing():
-            if unanswered < len(message.batch.scans):
+            for t, table, late_s in arrival.earlier:
+                self.ends.tracks(t, table, message, late_s)
+            if unanswered < len(message.batch.scans) or (arrival.waiting and arrival.taken):
                 self.ends.tracks(arrival.t, arrival.table, message, arrival.late_s)
                 for event in self._health.saw(arrival.taken, arrival.t):
                     self._tell(event)
+            if arrival.clocks is not None:
+                self._tell_clocks(arrival.clocks)
             if self.count % ARRIVALS_PER_DRAIN == 0:
                 self.drain()
                 if before is not None:
@@ -226,7 +232,7 @@ class Session:
             self.ends.warn(text)
 
     def summary(self) -> dict[str, Any]:
-        """The record of the session: version, configuration, counts, lateness, what was learnt."""
+        """The record of the session: version, configuration, counts, lateness, clocks, what was learnt."""
         lateness = {name: one._asdict() for name, one in self.live.lateness.summary().items()}
         states = self.live.tracker.sensor_states()
         return {
@@ -240,6 +246,7 @@ class Session:
             "restarts": dict(self._seen.restarts),
             "steps_taken_again": self.live.replayed,
             "lateness": lateness,
+            "clocks": self.live.clocks,
             "learnt": {name: nan_as_null(one._asdict()) for name, one in states.items()},
         }
 
@@ -276,6 +283,14 @@ class Session:
             return False
         self._unconfirmed = ""
         return True
+
+    def _tell_clocks(self, news: ClockNews) -> None:
+        """Say what was found of the sensors' clocks."""
+        for text in news.lines:
+            self.ends.warn(text)
+        for name, found in news.taken_off.items():
+            numbers = {"lag_s": self.live.clocks[name]["lag_s"], "std_s": found.std_s}
+            self.ends.event(HealthChange(self.live.time or 0.0, name, CLOCK, "", numbers))
 
     def _tell(self, event: HealthChange) -> None:
         self.ends.warn(f"warning: {event.text}")

@@ -6,15 +6,17 @@ at that time. What stands still agrees at all differences; what moves, at the ri
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.in_steps import run_through
 
 # Scans of the second sensor that are compared, and boxes of one that are.
-_SCANS, _MOST_BOXES = 240, 24
+_SCANS, _LEAST_SCANS, _MOST_BOXES = 240, 60, 24
 # Boxes agree where their centres are apart by less than this share of their size, sizes within this factor.
 _REACH, _SAME_SIZE = 0.6, 2.0
 # Differences that are tried (s): finely near none, coarsely elsewhere, and how far from none and from the
@@ -26,6 +28,8 @@ _LEAST_BOXES = 30
 _FEW, _CLEAR, _LEAST_USUAL = 60, 3.0, 0.05
 # A look at a scan of the first sensor counts for a difference that it is not farther from (s).
 _NEAR_S = 0.6
+# Scans that are looked at in one step.
+_SCANS_A_STEP = 64
 
 
 class Agreement(NamedTuple):
@@ -61,16 +65,37 @@ def best_agreement(first: Detections, second: Detections) -> Agreement | None:
     Returns:
         The agreement; None where there is too little to compare.
     """
-    ours, theirs = _looks(first, None), _looks(second, _SCANS)
+    return run_through(agreement_in_steps(first, second))
+
+
+def agreement_in_steps(
+    first: Detections, second: Detections, pairs: int | None = None
+) -> Generator[None, None, Agreement | None]:
+    """Do what `best_agreement` does, one difference of the clocks a step.
+
+    Args:
+        first: as there.
+        second: as there.
+        pairs: so many pairs of boxes are compared in one step at most, by looking at fewer scans.
+    """
     if min(len(first), len(second)) < _LEAST_BOXES:
         return None
+    ours = yield from _looks(first, None)
+    scans = _SCANS
+    if pairs is not None:
+        wide = ours.boxes.shape[1] * min(int(np.diff(second.scan_start).max()), _MOST_BOXES)
+        scans = min(scans, max(pairs // wide, _LEAST_SCANS))
+    theirs = yield from _looks(second, scans)
     tried = _differences(ours.t, theirs.t)
     if not len(tried):
         return None
     near = tried[np.abs(tried) <= _FINE_S]
     few = tried[:: max(len(tried) // _FEW, 1)]
     for offsets in (np.union1d(near, few), tried):
-        scores = np.array([_score(ours, theirs, float(offset)) for offset in offsets])
+        scores = np.zeros(len(offsets))
+        for k, offset in enumerate(offsets.tolist()):
+            scores[k] = _score(ours, theirs, offset)
+            yield
         best, usual = int(scores.argmax()), float(np.median(scores))
         if abs(offsets[best]) < 0.5 * _FINE_S and scores[best] > _CLEAR * max(usual, _LEAST_USUAL):
             break  # they agree as they are, or nearly: the rest need not be tried
@@ -95,7 +120,7 @@ def _differences(ours: FloatArray, theirs: FloatArray) -> FloatArray:
     return np.asarray(tried[(tried >= low) & (tried <= high)])
 
 
-def _looks(detections: Detections, most: int | None) -> _Looks:
+def _looks(detections: Detections, most: int | None) -> Generator[None, None, _Looks]:
     filled = np.flatnonzero(np.diff(detections.scan_start) > 0)
     if most is not None and len(filled) > most:
         filled = filled[np.linspace(0, len(filled) - 1, most).round().astype(int)]
@@ -110,6 +135,8 @@ def _looks(detections: Detections, most: int | None) -> _Looks:
         own = detections.boxes[rows]
         size = np.sqrt(own[:, 2] * own[:, 3])
         out[k, : len(rows)] = np.column_stack([own[:, :2] + 0.5 * own[:, 2:], np.log(size), size])
+        if k % _SCANS_A_STEP == 0:
+            yield
     return _Looks(detections.scan_t[filled], out)
 
 

@@ -7,13 +7,14 @@ one factor graph (`refining`). 5. Does the traffic tell it? Where it does not, n
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.in_steps import run_through, worth
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.rig.clock_search import offset_of, rank_offsets
 from jeat_graph.rig.matching import MatchedTracks, match_again, match_at, no_tracks
@@ -22,6 +23,8 @@ from jeat_graph.rig.sensor_tracks import SensorTracks, joined
 
 # Rough differences of the clocks that are tried, and rounds of matching and refining.
 _CANDIDATES, _ROUNDS = 4, 2
+# What a round of matching is worth in steps of about a millisecond.
+_MATCHING_STEPS = 16
 #: Fewer vehicles tell nothing.
 LEAST_VEHICLES = 8
 # Of the vehicles that both could see such a share must be matched; a map that is quite another has no more
@@ -110,10 +113,24 @@ def clock_by_map(
     Returns:
         Offset and standard deviation; None where the traffic does not tell.
     """
+    return run_through(clock_by_map_in_steps(first, second, way, guesses_s, least))
+
+
+def clock_by_map_in_steps(
+    first: SensorTracks,
+    second: SensorTracks,
+    way: PictureMap,
+    guesses_s: Sequence[float] | None = None,
+    least: int = LEAST_VEHICLES,
+) -> Generator[None, None, ClockConfig | None]:
+    """Do what `clock_by_map` does, one round of matching or of fitting a step."""
     if guesses_s is None:
         guesses_s = [offset_of(one.shift, first, second) for one in rank_offsets(first, second, _CANDIDATES)]
     none = no_tracks()
-    found = [match_again(first, second, MatchedTracks(none, none, way, one, 0)) for one in guesses_s]
+    found = []
+    for guess in guesses_s:
+        found.append(match_again(first, second, MatchedTracks(none, none, way, guess, 0)))
+        yield from worth(_MATCHING_STEPS)
     best = max(found, key=lambda one: len(one.a), default=None)
     if best is None or len(best.a) < max(least, _LEAST_SHARE * best.possible):
         return None
@@ -122,7 +139,9 @@ def clock_by_map(
         clock = _offset_of_matches(first, second, best, least)
         if clock is None:
             return None
+        yield from worth(_MATCHING_STEPS)
         best = match_again(first, second, best._replace(offset_s=clock.offset_s))
+        yield from worth(_MATCHING_STEPS)
     return clock
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.in_steps import run_through
 
 #: Step of the grid (s).
 STEP_S = 0.1
@@ -22,6 +23,8 @@ _BIN_S = 0.2
 _SAME_IOU = 0.4
 # What moves by less than this many of its sizes stands still.
 _MOVES = 1.0
+# Scans that are looked at in one step.
+_SCANS_A_STEP = 16
 
 
 class TrackMeasurements(NamedTuple):
@@ -88,6 +91,13 @@ def sensor_tracks(
         boxes: (R, 4) left, top, width, height (px).
         detections: of this sensor alone.
     """
+    return run_through(sensor_tracks_in_steps(t, track_id, boxes, detections))
+
+
+def sensor_tracks_in_steps(
+    t: FloatArray, track_id: IntArray, boxes: FloatArray, detections: Detections
+) -> Generator[None, None, SensorTracks]:
+    """Do what `sensor_tracks` does, a part of a track each step."""
     start = float(np.floor(t.min() / STEP_S)) * STEP_S if len(t) else 0.0
     steps = int(np.ceil((t.max() - start) / STEP_S)) + 1 if len(t) else 1
     grid = start + STEP_S * np.arange(steps)
@@ -98,7 +108,7 @@ def sensor_tracks(
         if when[-1] - when[0] < _LEAST_S:
             continue
         centre, size = own[:, :2] + 0.5 * own[:, 2:], own[:, 2:]
-        one = _measurements(when, own, detections)
+        one = yield from _measurements(when, own, detections)
         if len(one.t) < 2:
             continue
         at = np.column_stack([np.interp(grid, when, v, np.nan, np.nan) for v in (*centre.T, *size.T)])
@@ -109,6 +119,7 @@ def sensor_tracks(
         measured.append(one)
         far = np.linalg.norm(centre[-1] - centre[0])
         moves.append(float(far > _MOVES * np.sqrt(np.median(size.prod(axis=1)))))
+        yield
     empty = np.zeros((0, steps, 2))
     return SensorTracks(
         start,
@@ -119,11 +130,15 @@ def sensor_tracks(
     )
 
 
-def _measurements(t: FloatArray, boxes: FloatArray, detections: Detections) -> TrackMeasurements:
+def _measurements(
+    t: FloatArray, boxes: FloatArray, detections: Detections
+) -> Generator[None, None, TrackMeasurements]:
     """Take the detections that a track rests on, a few at a time, in their mean."""
     first = np.searchsorted(detections.scan_t, t - 1e-9)
     times, centres, sizes = [], [], []
     for k, scan in enumerate(first):
+        if k % _SCANS_A_STEP == 0:
+            yield
         if scan >= detections.num_scans or abs(detections.scan_t[scan] - t[k]) > 1e-6:
             continue
         found = detections.boxes[detections.scan_start[scan] : detections.scan_start[scan + 1]]

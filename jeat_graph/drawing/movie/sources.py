@@ -30,6 +30,8 @@ from jeat_graph.drawing.movie.totals import counters
 from jeat_graph.eval.counting import Line
 from jeat_graph.eval.zones import Zone
 from jeat_graph.io.events.layout import EventLayout
+from jeat_graph.io.events.trigger_times import TriggerChoice, times_by_triggers
+from jeat_graph.io.media.video import FrameSource, open_frames
 from jeat_graph.rig.common_picture import CommonPicture, Way, common_time
 from jeat_graph.runs.directory import ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON, read_record
 
@@ -69,6 +71,7 @@ class Request:
         reading: what a result or truth does not say itself.
         event_size_px: width and height of the events' picture, where their file does not say.
         event_layout: columns, unit of time and recording, where the file of events leaves that open.
+        frame_times: edges of the events' triggers that say when frames were taken; None: as the frames say.
         rig: pictures and clocks of the sensors; frames are those of `rgb`, events those of `evt`.
         captions: what stands beside a track, of `captions.PARTS`; by default all that is known.
         road: a folder that `road` wrote, for speeds; by default the run's own tables of the road.
@@ -93,6 +96,7 @@ class Request:
     reading: ReadingOptions = field(default_factory=ReadingOptions)
     event_size_px: tuple[int, int] | None = None
     event_layout: EventLayout | None = None
+    frame_times: TriggerChoice | None = None
     rig: Path | None = None
     captions: tuple[str, ...] = PARTS
     road: Path | None = None
@@ -114,7 +118,6 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     """
     from jeat_graph.io.events.frame_clock import FrameClock, events_later_us
     from jeat_graph.io.events.stretches import open_stretches
-    from jeat_graph.io.media.video import open_frames
     from jeat_graph.io.tables.scans_io import read_instants
     from jeat_graph.io.tables.truth_io import read_truth
 
@@ -122,7 +125,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     frames = events = clock = None
     ways = _ways(request)
     if request.frames is not None:
-        source = stack.enter_context(open_frames(request.frames, request.frame_rate_hz))
+        source = stack.enter_context(_frames(request))
         clock = FrameClock(float(source.times_s[0]), source.origin_s)
         if (own := ways[VideoBackground.name].clock) is not None:
             source.times_s = common_time(source.times_s, own)
@@ -137,7 +140,8 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         beside = frames.size_px if frames else None
         stretches = open_stretches(request.events, request.event_size_px, request.event_layout, beside)
         stack.callback(stretches.close)
-        stretches.t_offset_us, _ = events_later_us(stretches.t_offset_us, stretches.origin_us, clock)
+        later_us, _ = events_later_us(stretches.t_offset_us, stretches.origin_us, clock)
+        stretches.t_offset_us = later_us if request.frame_times is None else 0
         if (own := ways[EventBackground.name].clock) is not None:
             stretches.t_offset_us -= round(own.offset_s * _US_PER_S)
         events = EventBackground(stretches, window_s)
@@ -169,6 +173,17 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     warnings += _absent(frames, tables, truth, times)
     warnings += [f"{request.events}: {note}" for note in ([] if events is None else stretches.notes())]
     return movie, rate_hz, warnings
+
+
+def _frames(request: Request) -> FrameSource:
+    """Open the frames, with the times that were asked for."""
+    assert request.frames is not None
+    if request.frame_times is None:
+        return open_frames(request.frames, request.frame_rate_hz)
+    if request.events is None or request.frame_rate_hz is not None:
+        raise DataError("--frame-times takes triggers of --events in place of --rate: give --events alone")
+    times = times_by_triggers(request.events, request.frame_times, request.event_layout)
+    return open_frames(request.frames, times=times)
 
 
 def _ways(request: Request) -> dict[str, Way]:

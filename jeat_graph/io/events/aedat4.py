@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.extras import install
@@ -24,6 +26,9 @@ MAGIC = b"#!AER-DAT4"
 _LOOKED_THROUGH = 1000
 _KINDS = ("events", "frame")
 _NO_LIMIT = 1 << 16
+# Kinds of triggers: 1 a signal rises, 2 it falls, 3 a pulse; 4 and 5 of the generator; a frame begins 6 and
+# ends 7, its exposure 8 and 9; 0 a reset of the clock. These end what the number before begins.
+_ENDS = (2, 5, 7, 9)
 
 
 class Aedat4Reader(EventReader):
@@ -60,7 +65,7 @@ class Aedat4Reader(EventReader):
             if "triggers" in packet:
                 rows = packet["triggers"]
                 t = rows["t"].astype(np.int64) - self.origin_us
-                edges.append(Triggers(t, rows["source"].astype(np.uint8), np.ones(len(t), dtype=np.uint8)))
+                edges.append(_edges(t, rows["source"].astype(np.uint8)))
                 continue
             rows = packet["events"]
             inside = (rows["x"] < width) & (rows["y"] < height)
@@ -90,6 +95,12 @@ class Aedat4Reader(EventReader):
             if not found:
                 raise
             self.damage.unfinished = f"it was read only up to a damaged packet: {error.message}"
+
+
+def _edges(t_us: IntArray, source: npt.NDArray[np.uint8]) -> Triggers:
+    """Return triggers, the two kinds of one signal as one channel: the number of the kind that begins."""
+    ends = np.isin(source, _ENDS)
+    return Triggers(t_us, np.where(ends, source - 1, source).astype(np.uint8), (~ends).astype(np.uint8))
 
 
 def packets_of(path: Path) -> Iterator[Any]:

@@ -19,6 +19,8 @@ from jeat_graph.data.errors import ConfigError
 
 #: Roles of columns: time, column and row of the pixel, polarity.
 ROLES = ("t", "x", "y", "p")
+#: Clocks of a bag's events: the camera's own, or that of the messages' headers.
+SENSOR, HEADER = CLOCKS = ("sensor", "header")
 #: A column that is not read, in `EventLayout.columns`.
 PASSED_OVER = "-"
 #: Units of time, and how many of them a second has.
@@ -75,6 +77,8 @@ class EventLayout:
         time_unit: `s`, `ms`, `us` or `ns`; None leaves it to names and data.
         stream: which recording of several in the file: the group or data set of HDF5, the topic of a bag, the
             member of a zip archive; None where there is one.
+        clock: of a bag, `sensor` (as None): the camera's clock from the first message's stamp on; `header`:
+            the stamps of all messages.
 
     Raises:
         ConfigError: a role that is missing or there twice, or a unit that is none.
@@ -83,6 +87,7 @@ class EventLayout:
     columns: tuple[str, ...] | None = None
     time_unit: str | None = None
     stream: str | None = None
+    clock: str | None = None
 
     def __post_init__(self) -> None:
         if self.columns is not None:
@@ -94,6 +99,8 @@ class EventLayout:
                 )
         if self.time_unit is not None and self.time_unit not in PER_SECOND:
             raise ConfigError(f"the unit of time must be {', '.join(PER_SECOND)}, not {self.time_unit}")
+        if self.clock is not None and self.clock not in CLOCKS:
+            raise ConfigError(f"the clock of events must be {' or '.join(CLOCKS)}, not {self.clock}")
 
 
 def role_of(name: str) -> tuple[str, str | None] | None:

@@ -59,7 +59,7 @@ def open_events(
     layout = layout or EventLayout()
     reader = _opened(Path(path), size_px, layout)
     reader.size_given = size_px is not None
-    for name in ("columns", "time_unit", "stream"):
+    for name in ("columns", "time_unit", "stream", "clock"):
         if getattr(layout, name) is not None and name not in reader.understands:
             reader.close()
             option = f"--event-{name.replace('_', '-')}"

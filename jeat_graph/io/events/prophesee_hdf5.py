@@ -83,7 +83,7 @@ class PropheseeHdf5Reader(EventReader):
     def _triggers(self) -> Triggers:
         if self._edges is None:
             return Triggers.none()
-        rows = self._read(self._edges, slice(0, PIECE_ROWS))
+        rows = self._read(self._edges, slice(None))
         return Triggers(
             rows["t"].astype(np.int64), rows["id"].astype(np.uint8), (rows["p"] > 0).astype(np.uint8)
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,9 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
+
+if TYPE_CHECKING:
+    from jeat_graph.io.events.message_clock import Stamps
 
 #: Events of one piece: a piece takes about 3.4 MB, whatever the length of the file.
 PIECE_ROWS = 1 << 18
@@ -155,6 +158,7 @@ class EventReader:
         labels: whether pieces say what caused the events, where the file does.
         triggers: edges of external signals that came with the last piece.
         damage: what was passed over so far.
+        stamps: what the stamps of messages and the camera's own clock said so far, where a file has both.
     """
 
     format_name = "events"
@@ -169,6 +173,7 @@ class EventReader:
         self.labels = True
         self.triggers = Triggers.none()
         self.damage = Damage()
+        self.stamps: Stamps | None = None
 
     def __enter__(self) -> Self:
         return self

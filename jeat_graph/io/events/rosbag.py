@@ -9,7 +9,8 @@
 
 A bag is a file of ROS 1, a folder of ROS 2, or one file of it alone (MCAP, SQLite). Events have the camera's
 clock or that of the bag. If they are far from the stamp in the header of the first message, they have the
-camera's: then that stamp says when the message's first event was, and the camera's clock leads on from there.
+camera's: then that stamp says when the message's first event was, and the camera's clock leads on from there,
+or every message's stamp does (`--event-clock header`).
 Times count from the first event's whole second; `origin_us` leads back to the clock of the bag.
 Sources: https://github.com/uzh-rpg/rpg_dvs_ros, https://github.com/ros-event-camera/event_camera_msgs
 """
@@ -25,15 +26,14 @@ from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.extras import install
 from jeat_graph.io.events.ascending import Ascending
-from jeat_graph.io.events.layout import EventLayout
+from jeat_graph.io.events.layout import HEADER, EventLayout
+from jeat_graph.io.events.message_clock import OTHER_CLOCK_US, Dated, Stamps, by_stamps
 from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers, agreed_size
 from jeat_graph.io.events.ros_messages import EDGES, ENCODINGS, Decoded, PacketDecoder, RosMessage
 
 _ARRAYS = ("dvs_msgs", "prophesee_event_msgs")
 _PACKETS = ("event_camera_msgs", "event_array_msgs")
 _US_PER_S, _NS_PER_US = 1_000_000, 1000
-#: Events this far from their message's stamp have another clock than it (µs).
-_OTHER_CLOCK_US = 10 * _US_PER_S
 #: Stamps and the camera's clock that part by more than this are remarked on (µs).
 _DRIFT_US = 20_000
 #: Suffixes by which the package knows files of ROS 2.
@@ -47,20 +47,14 @@ class _Topic(NamedTuple):
     edges: list[Any]
 
 
-class _Dated(NamedTuple):
-    """What a message holds, piece by piece; the first piece has its stamp on the clock of the bag (µs)."""
-
-    stamp_us: int | None
-    decoded: Decoded
-
-
 class RosbagReader(EventReader):
     """Reads the events of a bag, and the edges of signals that come with them.
 
     Args:
         path: the bag: a file of ROS 1, a folder of ROS 2, or one of its files.
         size_px: width and height of the picture; by default as the messages say.
-        layout: which topic to read, where several have events.
+        layout: which topic to read, where several have events; whether to go by the camera's clock or by all
+            stamps.
 
     Raises:
         ConfigError: the package `rosbags` is not installed.
@@ -68,7 +62,7 @@ class RosbagReader(EventReader):
     """
 
     format_name = "ROS bag"
-    understands = ("stream",)
+    understands = ("stream", "clock")
 
     def __init__(
         self, path: Path, size_px: tuple[int, int] | None, layout: EventLayout | None = None
@@ -77,8 +71,10 @@ class RosbagReader(EventReader):
         self._second = _is_second(path)
         self._bag = _open(path, self._second)
         self._offset_us: int | None = None
+        layout = layout or EventLayout()
+        self._by_header = layout.clock == HEADER
         try:
-            self._topic = self._choose((layout or EventLayout()).stream)
+            self._topic = self._choose(layout.stream)
             first = next(self._messages(self._topic.connections), None)
             if first is not None:
                 message = RosMessage(first[2], self._second)
@@ -106,8 +102,10 @@ class RosbagReader(EventReader):
         ascending = Ascending(self.damage)
         width, height = self.size_px or (1 << 16, 1 << 16)
         edges: list[Triggers] = []
-        drift_us = 0
-        for stamp_us, decoded in self._decoded():
+        dated = self._noted()
+        for _, stamp_us, decoded in (
+            by_stamps(dated, self._topic.connections[0].topic) if self._by_header else dated
+        ):
             first_us = decoded.first_us
             if first_us is None:
                 continue
@@ -115,8 +113,6 @@ class RosbagReader(EventReader):
                 assert stamp_us is not None
                 self._set_clock(stamp_us, first_us)
             assert self._offset_us is not None
-            if stamp_us is not None and abs(stamp_us - first_us) > _OTHER_CLOCK_US:
-                drift_us = max(drift_us, abs(stamp_us - first_us - self._offset_us))
             later = self._offset_us - self.origin_us
             if len(decoded.triggers.t_us):
                 edges.append(decoded.triggers._replace(t_us=decoded.triggers.t_us + later))
@@ -128,10 +124,12 @@ class RosbagReader(EventReader):
             for first in range(0, len(whole), PIECE_ROWS):
                 self.triggers, edges = Triggers.joined(edges), []
                 yield whole.take(slice(first, first + PIECE_ROWS))
-        if drift_us > _DRIFT_US:
+        stamps = self.stamps
+        if stamps is not None and stamps.differ and stamps.apart_us > _DRIFT_US:
+            told = "the stamps" if self._by_header else "the camera, from the first stamp on"
             self.damage.clock = (
-                f"stamps of messages and the camera's clock part by up to {drift_us / _US_PER_S:.3g} s; "
-                "times are those of the camera, from the first stamp on"
+                "stamps of messages and the camera's clock part by up to "
+                f"{stamps.apart_us / _US_PER_S:.3g} s; times are those of {told}"
             )
         if edges:
             self.triggers = Triggers.joined(edges)
@@ -140,10 +138,20 @@ class RosbagReader(EventReader):
     def _set_clock(self, stamp_us: int, first_us: int) -> None:
         """Lead from the clock of the events to that of the bag, by the first message."""
         apart = stamp_us - first_us
-        self._offset_us = apart if abs(apart) > _OTHER_CLOCK_US else 0
+        self._offset_us = apart if abs(apart) > OTHER_CLOCK_US else 0
         self.origin_us = (first_us + self._offset_us) // _US_PER_S * _US_PER_S
 
-    def _decoded(self) -> Iterator[_Dated]:
+    def _noted(self) -> Iterator[Dated]:
+        """Take note of what both clocks say of the messages with events."""
+        self.stamps = None
+        for one in self._decoded():
+            if one.stamp_us is not None and len(one.decoded.t_us):
+                own_us = int(one.decoded.t_us[0])
+                known = self.stamps or Stamps(one.stamp_us, one.stamp_us, own_us, own_us, 0)
+                self.stamps = known.and_then(one.stamp_us, own_us)
+            yield one
+
+    def _decoded(self) -> Iterator[Dated]:
         self._decoder.size_given = self.size_given
         alone = {id(connection) for connection in self._topic.edges}
         for connection, recorded_ns, raw in self._messages([*self._topic.connections, *self._topic.edges]):
@@ -153,7 +161,7 @@ class RosbagReader(EventReader):
                 message.whole("I")
                 message.whole("I")
                 if _package(connection) in _ARRAYS:
-                    yield _Dated(stamp_us, Decoded(*message.events(), Triggers.none()))
+                    yield Dated(connection.topic, stamp_us, Decoded(*message.events(), Triggers.none()))
                     continue
                 packet = message.packet()
             except (struct.error, ValueError):
@@ -161,7 +169,7 @@ class RosbagReader(EventReader):
             if packet.encoding == EDGES or id(connection) not in alone:
                 stamp: int | None = stamp_us
                 for decoded in self._decoder.decode(packet):
-                    yield _Dated(stamp, decoded)
+                    yield Dated(connection.topic, stamp, decoded)
                     stamp = None if decoded.first_us is not None else stamp
             lead = (self._offset_us or 0) - self.origin_us
             self._decoder.count(self.damage, lead)

@@ -14,7 +14,7 @@ FFV1 stands in AVI because Matroska files carry a random number and no two of th
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Self
 
@@ -118,7 +118,11 @@ class FrameSource:
         return self._kept[index]
 
 
-def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
+def open_frames(
+    path: str | Path,
+    rate_hz: float | None = None,
+    times: Callable[[int], tuple[FloatArray, str]] | None = None,
+) -> FrameSource:
     """Open a video file, a folder of pictures, or a folder that holds one of them under its name above.
 
     An AEDAT 4 file has frames with times of their own. Else times come from a list in or above the folder or
@@ -128,6 +132,7 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
     Args:
         path: the video or folder. Pictures are `.png` or `.jpg`, in natural order (2 before 10).
         rate_hz: frames per second, for files whose own times are wrong or missing.
+        times: gives the times of so many frames (F,) in s, and where they come from, in place of all these.
 
     Raises:
         DataError: nothing there, nothing to be read, no rate known, or a list of times that does not fit.
@@ -137,17 +142,17 @@ def open_frames(path: str | Path, rate_hz: float | None = None) -> FrameSource:
     if place.is_dir():
         inner = next((place / name for name in VIDEO_FILES.values() if (place / name).exists()), None)
         if inner is not None:
-            return open_frames(inner, rate_hz)
+            return open_frames(inner, rate_hz, times)
         decode: Decoder = PictureDecoder(place)
     elif place.is_file():
         decode = _decoder(place)
     else:
         raise DataError("no such video or folder of pictures", place)
     try:
-        times, clock = _times(place, decode, rate_hz)
+        times_s, clock = _times(place, decode, rate_hz) if times is None else times(decode.count())
         first = decode.bgr(0)
-        source = FrameSource(place, times, (first.shape[1], first.shape[0]), decode)
-        source.clock, source.origin_s = clock, decode.origin_s()
+        source = FrameSource(place, times_s, (first.shape[1], first.shape[0]), decode)
+        source.clock, source.origin_s = clock, decode.origin_s() if times is None else 0.0
         source.missing = max(decode.announced() - len(source), 0)
         return source
     except BaseException:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -64,9 +63,8 @@ class Sinks:
         self._send(json_line(t, table), message)
 
     def event(self, event: HealthChange) -> None:
-        """Give out that a sensor fails or is well again."""
-        line = json.dumps({"t": event.t, "event": f"sensor-{event.what}", "sensor": event.sensor})
-        self._send(line, None)
+        """Give out that a sensor fails or is well again, or that its clock was found."""
+        self._send(event.line(), None)
 
     def _send(self, line: str, message: ScanMessage | None) -> None:
         for sink, encoding, status in self._opened:

@@ -74,6 +74,8 @@ class Metrics:
         yield family(gauge, "sensor_last_scan_seconds", "time of the newest scan", rows, "sensor")
         rows = [([sensor], one["age_s"]) for sensor, one in sensors]
         yield family(gauge, "sensor_age_seconds", "since the newest scan came", rows, "sensor")
+        rows = [([sensor], one["clock"]["lag_s"]) for sensor, one in sensors if one["clock"] is not None]
+        yield family(gauge, "sensor_clock_lag_seconds", "found, and taken off its times", rows, "sensor")
         ends = [("source", one) for one in (*health["sources"], *health["cameras"])]
         ends += [("sink", one) for one in health["sinks"]]
         for kind, name, key in ((gauge, "connected", "connected"), (counter, "reconnects", "reconnects")):

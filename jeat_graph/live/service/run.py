@@ -263,6 +263,7 @@ class Service:
         if session.duplicates == before:
             self.status.came(message.batch.scans)
         counted.passed_over = session.live.lateness.dropped
+        self.status.clocks = dict(session.live.clocks)
 
     def _bad(self, error: DataError, running: _Running) -> None:
         if self._config.on_error == "stop":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -93,6 +93,7 @@ class Status:
         sinks: brokers that tracks go to.
         cameras: those that are looked at here.
         sensors: by name what has come of them.
+        clocks: by sensor what was found of its clock and is taken off its times (`LiveTracker.clocks`).
         counted: what is counted.
         lag_s: how long after its own time the newest scan was answered (s), or None.
         tracks: how many are reported now.
@@ -108,6 +109,7 @@ class Status:
     sinks: list[EndStatus] = field(default_factory=list)
     cameras: list[LiveStatus] = field(default_factory=list)
     sensors: dict[str, SensorStatus] = field(default_factory=dict)
+    clocks: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     counted: Counted = field(default_factory=Counted)
     lag_s: float | None = None
     tracks: int = 0
@@ -186,6 +188,7 @@ class Status:
                     "age_s": round(now - one.seen, 3),
                     "scans": one.scans,
                     "boxes": one.boxes,
+                    "clock": dict(self.clocks[name]) if name in self.clocks else None,
                 }
                 for name, one in self._copied().items()
             },

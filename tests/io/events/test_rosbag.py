@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 
 import numpy as np
@@ -13,6 +14,7 @@ from jeat_graph.data.events import EventArray
 from jeat_graph.io.events import words
 from jeat_graph.io.events.layout import EventLayout
 from jeat_graph.io.events.opening import open_events
+from jeat_graph.io.events.trigger_times import times_by_triggers, trigger_choice
 
 from .plain import random_evt3, read_evt3
 
@@ -240,14 +242,17 @@ def test_packets_of_the_old_kind_are_read_with_the_topic_of_their_triggers(tmp_p
             message = packet(store, version, encoding, data.tobytes(), SECOND + 0.25, base, kind)
             raw = store.serialize_ros1(message, kind) if version == 1 else store.serialize_cdr(message, kind)
             bag.write(bag.add_connection(topic, kind, typestore=store), SECOND * 10**9, raw)
-    with open_events(path) as reader:
-        found, triggers = [], []
-        for piece in reader.pieces():
-            found += rows(piece)
-            triggers += list(zip(*(column.tolist() for column in reader.triggers), strict=True))
-    # The stamp says when the first event was: .25 s after a whole second.
-    assert found == [(250_000 + 2 * k, k, k + 1, k % 2) for k in range(10)]
-    assert triggers == [(250_001, 3, 1), (250_009, 3, 0)]
+    for clock in ("sensor", "header"):  # there is one message of each topic: the same
+        with open_events(path, layout=EventLayout(clock=clock)) as reader:
+            found, triggers = [], []
+            for piece in reader.pieces():
+                found += rows(piece)
+                triggers += list(zip(*(column.tolist() for column in reader.triggers), strict=True))
+        # The stamp says when the first event was: .25 s after a whole second.
+        assert found == [(250_000 + 2 * k, k, k + 1, k % 2) for k in range(10)]
+        assert triggers == [(250_001, 3, 1), (250_009, 3, 0)]
+    times, _ = times_by_triggers(path, trigger_choice("triggers:3:fall"))(1)
+    assert times == pytest.approx([0.250009])
 
 
 def test_triggers_among_the_words_of_evt3_are_counted(tmp_path, capsys):
@@ -336,3 +341,84 @@ def test_a_message_of_several_pieces_does_not_part_from_its_own_stamp(tmp_path, 
     found, reader = read(write(tmp_path, 2, [message], "event_camera_msgs/msg/EventPacket", store))
     assert [row[1:] for row in rows(found)] == [row[1:] for row in read_evt3(data).events]
     assert reader.damage.notes() == []
+
+
+def test_the_stamps_of_all_messages_may_be_the_clock(tmp_path, capsys):
+    """The first event of each message has its stamp, others lie as the camera says; `info` shows both."""
+    store = store_of(2)
+    words = np.array([(k * 1_000_000) | 5 << 32 | 6 << 48 for k in range(3)], "<u8").tobytes()
+    late = [0.0, 0.003, 0.050]
+    messages = [
+        packet(store, 2, "mono", words, SECOND + 0.5 + 0.01 * k + late[k], 10**7 * k) for k in range(3)
+    ]
+    path = write(tmp_path, 2, messages, "event_camera_msgs/msg/EventPacket", store)
+    with open_events(path, layout=EventLayout(clock="header")) as reader:
+        t_us = np.concatenate([piece.t_us for piece in reader.pieces()])
+        stamps = reader.stamps
+    first = [500_000, 513_000, 570_000]
+    expected = [first[0] + 1300 * j for j in range(3)] + [first[1] + 5700 * j for j in range(3)]
+    expected += [first[2] + 1000 * j for j in range(3)]
+    np.testing.assert_allclose(t_us, expected, atol=1)  # µs, to which stamps are rounded
+    begin = SECOND * 10**6
+    np.testing.assert_allclose(
+        stamps, (begin + first[0], begin + first[2], 0, 20_000, 50_000), rtol=0, atol=1
+    )
+    assert main(["events", "info", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert f"stamps of messages: {SECOND}.500000 to {SECOND}.5" in said
+    assert "0.000000 to 0.020000 s by the camera's own clock" in said
+    assert "part by up to 0.05" in said
+    assert "(--event-clock header goes by the stamps)" in said
+    assert main(["events", "info", str(path), "--json", "--event-clock", "header"]) == 0
+    assert json.loads(capsys.readouterr().out)["stamps"]["apart_us"] == pytest.approx(50_000, abs=1)
+
+
+def test_stamps_that_do_not_go_on_are_passed_over(tmp_path):
+    store = store_of(2)
+    words = np.array([0 | 5 << 32 | 6 << 48, 1_000_000 | 5 << 32 | 6 << 48], "<u8").tobytes()
+    stamps = [SECOND + 0.5, SECOND + 0.4, SECOND + 0.52]
+    messages = [packet(store, 2, "mono", words, stamp, 10**7 * k) for k, stamp in enumerate(stamps)]
+    path = write(tmp_path, 2, messages, "event_camera_msgs/msg/EventPacket", store)
+    with open_events(path, layout=EventLayout(clock="header")) as reader:
+        t_us = np.concatenate([piece.t_us for piece in reader.pieces()])
+    np.testing.assert_allclose(t_us, [500_000, 501_000, 510_000, 511_000, 520_000, 521_000], atol=1)
+
+
+def test_events_with_the_clock_of_the_bag_keep_it_whatever_is_asked(tmp_path, capsys):
+    store = store_of(2)
+    data = np.array([(1000 * k) | k << 32 | k << 48 for k in range(5)], "<u8").tobytes()
+    message = packet(store, 2, "mono", data, SECOND + 0.25, SECOND * 10**9)
+    path = write(tmp_path, 2, [message], "event_camera_msgs/msg/EventPacket", store)
+    found = []
+    for clock in (None, "sensor", "header"):
+        with open_events(path, layout=EventLayout(clock=clock)) as reader:
+            found.append(np.concatenate([piece.t_us for piece in reader.pieces()]).tolist())
+    assert found == [[0, 1, 2, 3, 4]] * 3
+    assert main(["events", "info", str(path)]) == 0
+    assert "the same clock" in capsys.readouterr().out
+
+
+def test_other_files_have_no_two_clocks(tmp_path):
+    path = tmp_path / "e.raw"
+    path.write_bytes(b"% evt 2.0\n% geometry 8x8\n% end\n")
+    with pytest.raises(DataError, match="is EVT2, where --event-clock says nothing"):
+        open_events(path, layout=EventLayout(clock="header"))
+
+
+def test_edges_of_a_topic_of_their_own_lie_among_the_events(tmp_path):
+    """Their own messages' stamps say when these were sent, not when the signal rose."""
+    from rosbags.rosbag2 import Writer
+
+    store, kind = store_of(2), "event_camera_msgs/msg/EventPacket"
+    words = np.array([(k * 1_000_000) | 5 << 32 | 6 << 48 for k in range(3)], "<u8").tobytes()
+    edge = np.array([5_000_000 | 3 << 48 | 1 << 63], "<u8").tobytes()  # half way between the messages
+    coming = [("/cam/events", "mono", words, 0.5, 0), ("/cam/trigger", "trigger", edge, 0.9, 0)]
+    coming += [("/cam/events", "mono", words, 0.52, 10**7)]  # 10 ms by the camera's clock, 20 by stamps
+    with Writer(tmp_path / "bag", version=9) as bag:
+        topics = {name: bag.add_connection(name, kind, typestore=store) for name, *_ in coming[:2]}
+        for k, (name, encoding, data, stamp, base) in enumerate(coming):
+            message = packet(store, 2, encoding, data, SECOND + stamp, base)
+            bag.write(topics[name], SECOND * 10**9 + k, store.serialize_cdr(message, kind))
+    with open_events(tmp_path / "bag", layout=EventLayout(clock="header")) as reader:
+        edges = [int(t) for _ in reader.pieces() for t in reader.triggers.t_us]
+    assert edges == [pytest.approx(510_000, abs=1)]
