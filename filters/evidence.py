@@ -42,6 +42,7 @@ class Evidence(ArrayTable):
         detections: (N,) number of detections.
         owner: (N,) index of the sensor that found it first.
         born_s, last_s: (N,) times of the first and the last detection (s).
+        confirmed_s: (N,) time of the last detection that tells that it is still there (s).
     """
 
     PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
@@ -67,6 +68,7 @@ class Evidence(ArrayTable):
     owner: IntArray
     born_s: FloatArray
     last_s: FloatArray
+    confirmed_s: FloatArray
 
     def __len__(self) -> int:
         return len(self.owner)
@@ -78,7 +80,7 @@ class Evidence(ArrayTable):
         whole, truth = np.zeros(0, dtype=np.int64), np.zeros((0, sensors), dtype=np.bool_)
         logits = per_sensor, per_sensor, per_sensor, per_sensor, per_sensor
         counts = per_sensor, per_sensor, per_sensor, per_sensor
-        return cls(*counts, truth, *logits, one, one, one, whole, one, one)
+        return cls(*counts, truth, *logits, one, one, one, whole, one, one, one)
 
     @classmethod
     def of_births(
@@ -120,6 +122,7 @@ class Evidence(ArrayTable):
             owner=owner,
             born_s=time,
             last_s=time.copy(),
+            confirmed_s=time.copy(),
         )
 
 
@@ -130,6 +133,7 @@ def count_hits(
     logits: FloatArray,
     gain: FloatArray,
     stationary: BoolArray,
+    confirms: BoolArray,
     clock: ScanClock,
     c: ModelConstants,
 ) -> Evidence:
@@ -142,6 +146,7 @@ def count_hits(
         logits: (K,) of the scores.
         gain: (K,) log likelihood of each detection against noise.
         stationary: (K,) which of the tracks stood.
+        confirms: (K,) which detections tell that the track is still there.
         clock: of the sensor's scan.
         c: constants.
     """
@@ -165,6 +170,7 @@ def count_hits(
     new.gained[rows] += np.minimum(gain, c.most_gain)
     new.detections[rows] += 1.0
     new.last_s[rows] = clock.t
+    new.confirmed_s[rows[confirms]] = clock.t
     return new
 
 

@@ -117,6 +117,8 @@ class ModelConstants:
         camera_shift_bounds, camera_scale_bounds: of the learnt values.
         camera_memory: share of these variances that a scan keeps.
         camera_time_s: what lasts longer of the camera's motion is the tracks' own (s).
+        confirming: a box that is less likely an object by itself does not tell that its track is still there:
+            what overlaps a better box is mostly a second one. Measured.
         report: least posterior, times the survival of its gap, of a track that is reported.
         inside_share: least share of a box within the picture of a track that is reported while nobody sees
         it. rival, rival_age_s: least posterior, and longest time since its last detection (s), of a track
@@ -242,6 +244,7 @@ class ModelConstants:
     camera_memory: float = 0.97
     camera_time_s: float = 0.3
 
+    confirming: float = 0.3
     report: float = 0.5
     inside_share: float = 0.8
     rival: float = 0.3

@@ -65,6 +65,23 @@ def logit(score: FloatArray) -> FloatArray:
     return np.asarray(np.log(bounded / (1.0 - bounded)))
 
 
+def box_probability(boxes: FloatArray, logits: FloatArray, indifference: float) -> FloatArray:
+    """Return the probability (M,) of each box to be an object by itself, whatever is tracked there.
+
+    Its odds are those of its score, times 1 − IoU with the most overlapping better box of the scan: of two boxes
+    at one place the worse one is mostly a second box of the same object.
+
+    Args:
+        boxes: (M, 4) left, top, right, bottom of one scan (px).
+        logits: (M,) of their scores.
+        indifference: a of the sensor; a + logit is the log odds by score.
+    """
+    overlap = np.where(logits[None] > logits[:, None], intersection_over_union(boxes, boxes), 0.0)
+    apart = 1.0 - overlap.max(axis=1, initial=0.0)
+    odds = np.exp(indifference + logits) * apart
+    return np.asarray(odds / (1.0 + odds))
+
+
 def count_repetition(
     counts: RepeatCounts, boxes: FloatArray, logits: FloatArray, c: ModelConstants
 ) -> RepeatCounts:

@@ -26,7 +26,7 @@ class Hypotheses(NamedTuple):
         log_odds: (N,) of being real, as the tracker has it.
         terms: their sum is `log_odds`, but for what was learnt since the last step.
         visible: (N,) probability that the object is there and not hidden.
-        unseen_s: (N,) time since a sensor found it last (s).
+        unseen_s: (N,) time since the last detection that told that it was there (s).
         detections: (N,) number of its detections.
         reported: (N,) whether the tables have it.
     """
@@ -79,7 +79,7 @@ def hypotheses_of(
         log_odds=np.asarray(columns["log_odds"]).reshape(-1),
         terms=log_odds_terms(evidence, belief, constants),
         visible=np.asarray(columns["presence"])[:, VISIBLE],
-        unseen_s=t - evidence.last_s,
+        unseen_s=t - evidence.confirmed_s,
         detections=evidence.detections,
         reported=np.isin(track_id, shown),
     )

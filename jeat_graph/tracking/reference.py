@@ -63,6 +63,7 @@ class AssociatedPairs(NamedTuple):
         track, box: (K,) rows of tracks, and of boxes.
         ratio: (K,) ln L of each.
         p_detect: (N,) each track's own P_D.
+        confirms: (K,) whether the box tells that the track is still there.
         innovation: of all boxes from all tracks.
         nis: (K,) squared distance of each centre in standard deviations, χ² of two degrees of freedom.
     """
@@ -71,6 +72,7 @@ class AssociatedPairs(NamedTuple):
     box: IntArray
     ratio: FloatArray
     p_detect: FloatArray
+    confirms: BoolArray
     innovation: box_sides.SideInnovations
     nis: FloatArray
 
@@ -223,7 +225,9 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     track, box = likelihood_ratio.assign(by_looks(ratio, scan.alike))
     seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track, box]
     nis = (seen[0].mean(axis=2) ** 2 / seen[1].mean(axis=(2, 3))).sum(axis=1)
-    return AssociatedPairs(track, box, ratio[track, box], p_detect, innovation, nis)
+    by_itself = score_calibration.box_probability(scan.boxes, scan.logits, float(state.sensors.indifference[k]))
+    confirms = by_itself[box] >= c.confirming
+    return AssociatedPairs(track, box, ratio[track, box], p_detect, confirms, innovation, nis)
 
 
 def by_looks(ratio: FloatArray, alike: FloatArray | None) -> FloatArray:
@@ -302,7 +306,9 @@ def count_hits_and_misses(
     presence[hit] = visibility.seen(len(hit))
     presence[missed] = visibility.miss(presence[missed], p_detect[missed])
     logits = scan.logits[pairs.box]
-    counted = evidence.count_hits(tracks.evidence, hit, k, logits, pairs.ratio, stationary[hit], clock, c)
+    counted = evidence.count_hits(
+        tracks.evidence, hit, k, logits, pairs.ratio, stationary[hit], pairs.confirms, clock, c
+    )
     counted = evidence.count_misses(counted, missed, k, visible, stationary[missed], clock.weight)
     keep = math.exp(-clock.weight * c.correlation_time_s / c.track_p_detect_memory_s)
     recent_hits, recent_misses, used = (

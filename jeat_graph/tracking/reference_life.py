@@ -95,8 +95,11 @@ def learn(state: ReferenceState, t: float, c: ModelConstants) -> None:
 
 
 def report(state: ReferenceState, t: float, c: ModelConstants) -> BoolArray:
-    """Return which tracks (N,) are reported: real, and their gap, if any, likely to end well."""
-    gap = unseen_for(state)
+    """Return which tracks (N,) are reported: real, and their gap, if any, likely to end well.
+
+    A gap begins with the last detection that told that the track was still there.
+    """
+    gap = np.asarray(state.time - state.tracks.evidence.confirmed_s)
     survival = gap_survival.survival(state.gaps, gap, c)
     period = np.where(state.period_s > 0.0, state.period_s, np.nan)
     due = _DUE * np.nanmin(np.append(period, np.inf))

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import gap_survival, sensor_offsets
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.singer import MOTION, STATES, told_motion
@@ -44,6 +44,7 @@ class Step(NamedTuple):
         track_id: (N,) the tracks then.
         real: (N,) their posterior.
         used: (N,) the sensors that found them.
+        confirmed: (N,) whether a detection of that time tells that they are still there.
     """
 
     t: float
@@ -51,6 +52,7 @@ class Step(NamedTuple):
     track_id: IntArray
     real: FloatArray
     used: IntArray
+    confirmed: BoolArray
 
     def track_ids(self) -> IntArray:
         """Return the identities (N,) of the tracks after it, before any ended."""
@@ -151,7 +153,7 @@ class ReferenceModel:
             tracks.track_id,
             (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
         )
-        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used)
+        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used, tracks.evidence.confirmed_s == t)
 
     def record(self) -> Step:
         """Return what the last step gave the smoother."""
@@ -279,7 +281,7 @@ class ReferenceModel:
         steps = _with_sensors_of_their_time(self._steps)
         for number in range(len(steps) - 1, -1, -1):
             moment = steps[number]
-            ids, found = moment.track_id, moment.used != 0
+            ids, found = moment.track_id, moment.confirmed
             last = found & np.isinf(seen_next[ids])
             final[ids[last]] = moment.real[last]
             seen_next[ids[found]] = moment.t
@@ -303,7 +305,7 @@ class ReferenceModel:
         """Return when the tracks (N,) of each moment had been seen last (s)."""
         last, out = np.full(self._state.next_id, -np.inf), []
         for moment in self._steps:
-            found = moment.track_id[moment.used != 0]
+            found = moment.track_id[moment.confirmed]
             last[found] = moment.t
             out.append(last[moment.track_id])
         return out
@@ -341,13 +343,15 @@ def _with_sensors_of_their_time(steps: Sequence[Step]) -> list[Step]:
     """Return steps whose tracks have been found by the sensors of earlier steps of the same time as well."""
     out: list[Step] = []
     for one in steps:
-        used = one.used
+        used, confirmed = one.used, one.confirmed
         if out and out[-1].t == one.t:
             before = out[-1]
             lived = np.isin(before.track_id, one.track_id)
-            used = used.copy()
-            used[np.searchsorted(one.track_id, before.track_id[lived])] |= before.used[lived]
-        out.append(one._replace(used=used))
+            used, confirmed = used.copy(), confirmed.copy()
+            rows = np.searchsorted(one.track_id, before.track_id[lived])
+            used[rows] |= before.used[lived]
+            confirmed[rows] |= before.confirmed[lived]
+        out.append(one._replace(used=used, confirmed=confirmed))
     return out
 
 

@@ -45,6 +45,7 @@ def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detectio
         owner=np.array([owner]),
         born_s=np.zeros(1),
         last_s=np.ones(1),
+            confirmed_s=np.ones(1),
     )
 
 
@@ -236,6 +237,7 @@ def test_scores_count_once_a_track_however_often_it_is_found():
             logits,
             np.array([2.0]),
             np.array([False]),
+            np.array([n < 60]),
             clock._replace(t=0.05 * n),
             C,
         )
@@ -243,6 +245,7 @@ def test_scores_count_once_a_track_however_often_it_is_found():
     assert eta == pytest.approx(1.0 - 1.0)
     assert evidence.hits[0, 0] == pytest.approx(99 * 0.05 / 0.3)
     assert evidence.last_s[0] == pytest.approx(4.95)
+    assert evidence.confirmed_s[0] == pytest.approx(0.05 * 59)
 
 
 def test_a_sensor_more_changes_no_posterior():

@@ -107,6 +107,27 @@ def test_scores_above_which_boxes_come_again_are_found():
     assert score_calibration.indifference(counts, C) == pytest.approx(want)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_box_that_overlaps_a_better_one_is_less_likely_an_object(seed):
+    rng = np.random.default_rng(seed)
+    corner, logits = rng.uniform(0, 60, (12, 2)), rng.normal(0.0, 1.5, 12)
+    boxes = np.concatenate([corner, corner + rng.uniform(10, 40, (12, 2))], axis=1)
+    found = score_calibration.box_probability(boxes, logits, -0.7)
+    for j, (left, top, right, bottom) in enumerate(boxes):
+        apart = 1.0
+        for k, other in enumerate(boxes):
+            w, h = min(right, other[2]) - max(left, other[0]), min(bottom, other[3]) - max(top, other[1])
+            if logits[k] > logits[j] and w > 0 and h > 0:
+                areas = (right - left) * (bottom - top) + (other[2] - other[0]) * (other[3] - other[1])
+                apart = min(apart, 1.0 - w * h / (areas - w * h))
+        real, false = apart * np.exp(logits[j] - 0.7), 1.0
+        assert found[j] == pytest.approx(real / (real + false), rel=1e-12)
+
+
+def test_without_boxes_there_is_no_probability():
+    assert score_calibration.box_probability(np.zeros((0, 4)), np.zeros(0), 0.0).shape == (0,)
+
+
 def test_logits_of_certain_scores_are_finite():
     np.testing.assert_allclose(
         score_calibration.logit(np.array([0.0, 0.5, 1.0])), [-6.9068, 0.0, 6.9068], atol=1e-4

@@ -245,6 +245,21 @@ def test_a_vehicle_that_nobody_sees_for_two_seconds_keeps_its_identity_if_it_goe
 # What must change nothing.
 
 
+@pytest.mark.parametrize("overlaps", [True, False])
+def test_a_poor_box_upon_a_better_one_keeps_no_track_reported(overlaps):
+    """Two vehicles are seen well for 2 s; then one box is poor, and of use only where no better one covers it."""
+    config = load_config("default", ["sensors.rgb.even_score=0.5"])
+    made = Tracker(config, engine=ENGINE, image=IMAGE)
+    told = []
+    for k in range(60):
+        t, late = 0.05 * k, k >= 40
+        x = 700.0 - (60.0 if overlaps else 0.0) * t
+        boxes = np.array([[500.0, 400.0, 100.0, 60.0], [x, 410.0, 90.0, 60.0]])
+        told.append(len(made.step([(t, "rgb", boxes, np.array([0.9, 0.4 if late else 0.9]))])))
+    assert min(told[10:40]) == 2
+    assert told[-1] == (1 if overlaps else 2)
+
+
 def test_names_of_sensors_and_their_order_mean_nothing():
     batches = scene()
     _, base = run(batches)

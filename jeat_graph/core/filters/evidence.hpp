@@ -26,7 +26,7 @@ struct Evidence {
     std::vector<std::uint8_t> found;
     std::vector<double> overlap, gained, detections;
     std::vector<std::int64_t> owner;
-    std::vector<double> born_s, last_s;
+    std::vector<double> born_s, last_s, confirmed_s;
 
     std::size_t size() const { return owner.size(); }
 
@@ -47,6 +47,7 @@ struct Evidence {
         visit("owner", owner, 1);
         visit("born_s", born_s, 1);
         visit("last_s", last_s, 1);
+        visit("confirmed_s", confirmed_s, 1);
     }
 
     void widen() {
@@ -68,11 +69,11 @@ struct Evidence {
         overlap[row] = iou;
         detections[row] = 1.0;
         owner[row] = static_cast<std::int64_t>(sensor);
-        born_s[row] = last_s[row] = t;
+        born_s[row] = last_s[row] = confirmed_s[row] = t;
     }
 
-    void count_hit(std::size_t row, std::size_t sensor, double logit, double gain, bool stationary, const ScanClock& clock,
-                   const ModelConstants& c) {
+    void count_hit(std::size_t row, std::size_t sensor, double logit, double gain, bool stationary, bool confirms,
+                   const ScanClock& clock, const ModelConstants& c) {
         const std::size_t at = row * sensors + sensor;
         const bool first = hits[at] <= 0.0 && owner[row] != static_cast<std::int64_t>(sensor);
         hits[at] += clock.weight;
@@ -88,6 +89,7 @@ struct Evidence {
         gained[row] += std::min(gain, c.most_gain);
         detections[row] += 1.0;
         last_s[row] = clock.t;
+        if (confirms) confirmed_s[row] = clock.t;
     }
 
     void count_miss(std::size_t row, std::size_t sensor, double visible, bool stationary, double weight) {

@@ -119,6 +119,7 @@ struct Bounds {
     JEAT_PAIR(camera_scale_bounds) \
     JEAT_ONE(camera_memory) \
     JEAT_ONE(camera_time_s) \
+    JEAT_ONE(confirming) \
     JEAT_ONE(report) \
     JEAT_ONE(inside_share) \
     JEAT_ONE(rival) \

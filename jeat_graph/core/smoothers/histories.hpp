@@ -84,6 +84,7 @@ struct Entry {
     double t, dt;       // time, and since the last update (s)
     double real = 0.0;  // posterior after the step, where this was its last update
     std::int64_t used = 0;
+    bool confirmed = false;  // by a detection of that time
     bool last_of_step = false;
     std::array<double, kMean> predicted_mean, mean;
     Halves predicted_covariance, covariance;
@@ -226,11 +227,14 @@ private:
         }
         // What it turned out to be counts where that is sure; while nobody sees it, its gap must be one that ends well.
         for (std::size_t k = 0; k + 1 < n; ++k)
-            if (entries[k + 1].t == entries[k].t) entries[k + 1].used |= entries[k].used;
+            if (entries[k + 1].t == entries[k].t) {
+                entries[k + 1].used |= entries[k].used;
+                entries[k + 1].confirmed |= entries[k].confirmed;
+            }
         double final_real = 0.0, next_seen = std::numeric_limits<double>::infinity();
         until_seen_.assign(n, 0.0);
         for (std::size_t k = n; k-- > 0;) {
-            if (entries[k].used && entries[k].last_of_step) {
+            if (entries[k].confirmed && entries[k].last_of_step) {
                 if (!std::isfinite(next_seen)) final_real = entries[k].real;
                 next_seen = entries[k].t;
             }
@@ -241,11 +245,11 @@ private:
         for (; given < n && entries[given].t <= until; ++given) {
             const Entry& e = entries[given];
             if (!e.last_of_step) continue;
-            if (e.used) last_seen = e.t;
+            if (e.confirmed) last_seen = e.t;
             double real = final_real > c.sure ? std::max(e.real, final_real) : e.real;
             if (!std::isfinite(until_seen_[given])) continue;  // not seen again
             if (given + 1 < n && entries[given + 1].t == e.t) continue;  // a later step of the same time tells more
-            if (!e.used) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
+            if (!e.confirmed) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
             if (real > c.report)
                 out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used);
         }

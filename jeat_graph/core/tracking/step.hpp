@@ -73,6 +73,7 @@ public:
         for (std::size_t i = 0; entries && i < s_.tracks.size(); ++i) {
             entries[i].real = s_.tracks.real[i];
             entries[i].used = s_.tracks.used[i];
+            entries[i].confirmed = s_.tracks.evidence.confirmed_s[i] == s_.t;
             entries[i].last_of_step = true;
         }
     }
@@ -241,6 +242,7 @@ private:
             q_[j] = expit(s_.belief.indifference[k] + scan.logits[j]);
             of_clutter_[j] = association::score_likelihood(c_.clutter_precision, q_[j], c_);
         }
+        weigh_boxes(scan);
         const association::ScanTerms terms(s_.sensors[k].leftovers, s_.width * s_.height, c_);
         const ByLeft index(boxes_);
         pairs_.clear();
@@ -269,6 +271,21 @@ private:
             });
         }
         made_ = assignment_.solve(by_looks(scan), n, boxes_.size());
+    }
+
+    // Which boxes tell that their track is still there, by score and overlap with a better box of the scan.
+    void weigh_boxes(const Scan& scan) {
+        const ByLeft index(boxes_);
+        confirms_.resize(boxes_.size());
+        for (std::size_t j = 0; j < boxes_.size(); ++j) {
+            double overlap = 0.0;
+            index.near(boxes_[j], [&](std::size_t other) {
+                if (scan.logits[other] > scan.logits[j])
+                    overlap = std::max(overlap, intersection_over_union(boxes_[j], boxes_[other]));
+            });
+            const double odds = q_[j] / (1.0 - q_[j]) * (1.0 - overlap);
+            confirms_[j] = odds / (1.0 + odds) >= c_.confirming;
+        }
     }
 
     // The pairs with what their looks say. That tells who takes a box, and not whether there is an object.
@@ -349,7 +366,8 @@ private:
             } else {
                 const association::Pair& pair = pairs_[pair_of_[i]];
                 see_presence(presence);
-                tracks.evidence.count_hit(i, k, scan.logits[pair.column], pair.gain, stationary, clock, c_);
+                tracks.evidence.count_hit(i, k, scan.logits[pair.column], pair.gain, stationary,
+                                          confirms_[pair.column], clock, c_);
                 hits += clock.weight;
                 tracks.used[i] |= std::int64_t{1} << k;
             }
@@ -478,7 +496,7 @@ private:
             if (sensor.period_s > 0.0) period = std::min(period, sensor.period_s);
         reported.resize(tracks.size());
         for (std::size_t i = 0; i < tracks.size(); ++i) {
-            const double gap = unseen_for(i);
+            const double gap = s_.t - tracks.evidence.confirmed_s[i];
             const bool due = !(gap <= kSameTimeS || gap < kDue * period);
             const double survival = due ? s_.gaps.survival(gap, c_) : 1.0;
             reported[i] = tracks.real[i] * survival > c_.report &&
@@ -531,6 +549,7 @@ private:
     std::vector<std::size_t> made_, free_, taken_by_, pair_of_;
     std::vector<SidesExpected> expected_;
     std::vector<double> p_detect_, q_, of_clutter_;
+    std::vector<std::uint8_t> confirms_;  // of the scan's boxes
     std::vector<std::array<double, 4>> innovations_;  // of the pairs that are made
     std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
     std::vector<CameraTrack> camera_tracks_;
