@@ -27,8 +27,6 @@ HELP = (
     "from corresponding points, and write a rig for track, stream and calibrate"
 )
 _say = partial(say, "register")
-#: Digits of what is written: boxes are good to a hundredth of a pixel, clocks to a microsecond.
-_DIGITS, _TIME_PLACES = 9, 6
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Register every other sensor with the reference, and write the rig if all of it is known."""
-    from jeat_graph.config.rig_file import rig_text
+    from jeat_graph.config.rig_file import rig_text, sensor_entry
     from jeat_graph.io.files.atomic import check_writable, open_atomic
     from jeat_graph.io.tables.detections_io import read_many
 
@@ -109,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
             _say(line)
     width, height = sizes[reference]
     sensors: dict[str, dict[str, Any]] = {reference: {"image": [width, height], "to_picture": "none"}}
-    sensors |= {name: _entry(one, sizes[name]) for name, one in found.items()}
+    sensors |= {name: sensor_entry(one.way, one.clock, sizes[name]) for name, one in found.items()}
     notes = [
         f"made by jeat-graph register of {' + '.join(args.detections)}",
         *(line for one in found.values() for line in one.lines),
@@ -229,31 +227,6 @@ def _start(known: Config | None, name: str) -> MatchedTracks | None:
         return None
     offset = 0.0 if way.clock is None else way.clock.offset_s
     return MatchedTracks(no_tracks(), no_tracks(), way.picture, offset, 0)
-
-
-def _entry(found: Registration, size: tuple[int, int]) -> dict[str, Any]:
-    """What a rig says of a sensor."""
-    columns = 4 if found.way.parallax else 3
-    kept = [k for k in range(11) if columns == 4 or k not in (3, 7, 10)]
-    covariance = found.way.covariance[kept][:, kept]
-    out: dict[str, Any] = {
-        "image": list(size),
-        "to_picture": [[_short(v) for v in row[:columns]] for row in found.way.matrix],
-        "covariance": [[_short(v) for v in row] for row in covariance],
-    }
-    if found.clock is not None:
-        out |= {
-            "offset_s": round(found.clock.offset_s, _TIME_PLACES),
-            "offset_std_s": round(found.clock.offset_std_s, _TIME_PLACES),
-            "drift_ppm": round(found.clock.drift_ppm, 3),
-            "drift_std_ppm": round(found.clock.drift_std_ppm, 3),
-            "at_s": round(found.clock.at_s, _TIME_PLACES),
-        }
-    return out
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
 
 
 def _named_size(text: str) -> tuple[str, tuple[int, int]]:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import warnings
 
+import numpy as np
+
 from jeat_graph.config.reading import as_config, load_config
+from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.rig.sensor_tracks import SensorTracks, sensor_tracks
@@ -29,7 +32,16 @@ def own_tracks(detections: Detections, size_px: tuple[float, float] | None = Non
                 parts.append(tracker.drain_smoothed())
         parts.append(tracker.finish())
     table = Trajectories.concatenate(parts)
-    return sensor_tracks(table.t, table.track_id, table.boxes, detections)
+    whole = _whole(table.boxes, (config.image.width, config.image.height))
+    return sensor_tracks(table.t[whole], table.track_id[whole], table.boxes[whole], detections)
+
+
+def _whole(boxes: FloatArray, size_px: tuple[float, float]) -> BoolArray:
+    """Which boxes (N, 4) the picture's edge does not cut: of others neither size nor centre is seen."""
+    far = boxes[:, :2] + boxes[:, 2:]
+    return np.asarray((boxes[:, :2] > _EDGE_PX).all(axis=1) & (far < np.array(size_px) - _EDGE_PX).all(axis=1))
 
 
 _STEPS_PER_DRAIN = 256
+# Boxes that end so near to the picture's edge are cut by it.
+_EDGE_PX = 2.0

@@ -16,6 +16,7 @@ from jeat_graph.data.progress import refreshing
 if TYPE_CHECKING:
     from jeat_graph_sehn.simulation.dataset.workers import SourceFactory
     from jeat_graph_sehn.simulation.scenario import Scenario
+    from jeat_graph_sehn.simulation.world.rig import RigConfig
 
 HELP = "simulate a highway seen by an RGB and an event camera: detections or pictures, and truth"
 _DENSITIES = ("sparse", "normal", "dense")
@@ -57,6 +58,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     only = parser.add_argument_group("with --sensors detections")
     only.add_argument("--duration", type=float, metavar="S", help=f"length (default {_DURATION_S:g})")
+    only.add_argument(
+        "--rig",
+        metavar="drawn|FILE",
+        help="the event camera gets a place, lens, picture and clock of its own: drawn from the seed, or as a "
+        "YAML file says, such as {right_m: 0.3, width: 640, height: 480, focal_px: 550, offset_s: 2.5}; the "
+        "true rig.yaml is written beside",
+    )
     pictures = parser.add_argument_group(
         "with --sensors pictures or carla",
         "A run that was stopped goes on where it was when it is called again, and gives the same bytes.",
@@ -123,7 +131,7 @@ def run(args: argparse.Namespace) -> int:
         return _verify(Path(args.verify))
     if args.scenario is None or args.out is None:
         raise ConfigError("SCENARIO and --out DIR are needed (or --verify DIR)")
-    unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration",))]
+    unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration", "rig"))]
     unfit += [] if args.sensors == "carla" else _CARLA_ONLY
     unfit += ["imaging", "workers", "world", "event_camera", "masks"] if args.sensors == "carla" else []
     for name in unfit:
@@ -146,7 +154,7 @@ def _detections(args: argparse.Namespace, scenario: Scenario) -> int:
     duration = _DURATION_S if args.duration is None else args.duration
     with tqdm(total=STEPS, desc="simulate", disable=not sys.stderr.isatty(), leave=False) as bar:
         manifest = write_detection_set(
-            scenario, str(args.scenario), Path(args.out), args.seed, duration, bar.update
+            scenario, str(args.scenario), Path(args.out), args.seed, duration, bar.update, _rig(args.rig)
         )
     for name, count in manifest["sensors"].items():
         print(f"{name}: {count['detections']} boxes in {count['scans']} scans")
@@ -241,6 +249,17 @@ def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> 
     config = CarlaConfig(width=width, height=height)
     host, port = args.carla_host or "localhost", args.carla_port or 2000
     return partial(CarlaSource, scenario, config, args.seed, frames, host, port)
+
+
+def _rig(given: str | None) -> RigConfig | str | None:
+    """Settings of the second camera: none, to be drawn, or those of a file."""
+    from jeat_graph.config.section_tree import build
+    from jeat_graph_sehn.simulation.simulate import DRAWN
+    from jeat_graph_sehn.simulation.world.rig import RigConfig
+
+    if given is None or given == DRAWN:
+        return given
+    return build(RigConfig, _read_yaml(Path(given)), "")
 
 
 def _verify(folder: Path) -> int:
