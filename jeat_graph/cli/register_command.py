@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(
             f"there is one sensor, {reference!r}: a rig has two or more", " + ".join(args.detections)
         )
-    if args.camera and {name for name, _ in args.camera} != set(recording.sensors):
+    if args.camera and args.pattern is None and {name for name, _ in args.camera} != set(recording.sensors):
         raise DataError(f"--camera is needed of each sensor: {', '.join(recording.sensors)}")
     if args.points is not None and len(others) > 1:
         raise DataError("corresponding points are of two sensors, and there are more", args.points)
@@ -149,9 +149,12 @@ def _check_ways(args: argparse.Namespace) -> None:
         raise DataError("DETECTIONS are needed, or a --pattern with --view NAME=PATH of two sensors")
     if args.view and args.pattern is None:
         raise DataError("--view shows a pattern: say which with --pattern, such as checkerboard:9x6")
-    given = [name for name in ("pattern", "points", "camera") if getattr(args, name)]
-    if len(given) > 1:
-        raise DataError(f"--{given[0]} and --{given[1]} both tell the map: give one of them")
+    if args.pattern_side is not None and not (args.pattern and args.camera):
+        raise DataError("--pattern-side goes with --pattern and --camera NAME=CAMERA.yaml of the reference")
+    other = args.pattern or args.camera
+    if args.points is not None and other:
+        name = "pattern" if args.pattern else "camera"
+        raise DataError(f"--{name} and --points both tell the map: give one of them")
 
 
 def _write_pattern(args: argparse.Namespace, pattern: PatternMap) -> int:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
@@ -62,6 +63,13 @@ def add_pattern(parser: argparse.ArgumentParser) -> None:
         "charuco:8x6:4X4_50 (squares, markers)",
     )
     group.add_argument(
+        "--pattern-side",
+        type=positive,
+        metavar="M",
+        help="side of its squares, or distance of its circles (m): with --camera NAME=CAMERA.yaml of the "
+        "reference, it tells the other camera's lens and place, and boxes go with parallax",
+    )
+    group.add_argument(
         "--view",
         action="append",
         default=[],
@@ -104,8 +112,34 @@ def map_of_pattern(args: argparse.Namespace, reference: str | None) -> PatternMa
             f"{names[0]} saw the pattern at {len(seen[0])} places, {names[1]} at {len(seen[1])}: give as many of both"
         )
     places = [_place(*pair) for pair in zip(*seen, strict=True)]
-    way, lines = map_of_places(places, float(sizes[0][0]), sizes[1])
+    if args.camera:
+        way, lines = _with_camera(args, places, pattern, names[0], sizes)
+    else:
+        way, lines = map_of_places(places, float(sizes[0][0]), sizes[1])
     return PatternMap((names[0], names[1]), (sizes[0], sizes[1]), way, lines)
+
+
+def _with_camera(
+    args: argparse.Namespace,
+    places: list[Place],
+    pattern: Pattern,
+    reference: str,
+    sizes: list[tuple[int, int]],
+) -> tuple[PictureMap, list[str]]:
+    from jeat_graph.road.camera_file import read_camera
+    from jeat_graph.road.pattern_pose import map_by_pattern
+
+    if [name for name, _ in args.camera] != [reference] or args.pattern_side is None:
+        raise DataError(f"with --pattern goes --camera {reference}=CAMERA.yaml alone, and --pattern-side M")
+    file = args.camera[0][1]
+    first = read_camera(file)
+    if (first.width, first.height) != sizes[0]:
+        raise DataError(
+            f"is of pictures of {first.width} x {first.height} px, and those of {reference} have "
+            f"{sizes[0][0]} x {sizes[0][1]}",
+            file,
+        )
+    return map_by_pattern(places, pattern, args.pattern_side, first, sizes[1])
 
 
 def _place(first: _Seen, second: _Seen) -> Place:
@@ -117,7 +151,9 @@ def _place(first: _Seen, second: _Seen) -> Place:
 def _one_size(views: Sequence[_Seen]) -> tuple[int, int]:
     other = next((one for one in views if one.size != views[0].size), None)
     if other is not None:
-        raise DataError(f"is of {other.size[0]} x {other.size[1]} px, and {views[0].where} is not", other.where)
+        raise DataError(
+            f"is of {other.size[0]} x {other.size[1]} px, and {views[0].where} is not", other.where
+        )
     return views[0].size
 
 
@@ -159,7 +195,9 @@ def _counted(path: Path, size_px: tuple[int, int] | None) -> tuple[tuple[int, in
     with open_events(path, size_px) as reader:
         size = reader.size_px
         if size is None:
-            raise DataError("does not say the size of its picture: give it with --sensor-image NAME=WxH", path)
+            raise DataError(
+                "does not say the size of its picture: give it with --sensor-image NAME=WxH", path
+            )
         windows = np.zeros((_LOOKS + 1, size[1] * size[0]), dtype=np.int64)
         start = None
         for piece in reader.pieces():

@@ -83,6 +83,13 @@ class Pattern(NamedTuple):
             found.board()
         return found
 
+    def points(self, number: IntArray) -> FloatArray:
+        """Return where corners (K,) lie on the pattern (K, 2), in sides of a square or distances of circles."""
+        columns = self.columns - 1 if self.kind == CHARUCO else self.columns
+        row, column = number // columns, number % columns
+        across = 2 * column + row % 2 if self.kind == STAGGERED else column
+        return np.stack([across, row], axis=1).astype(np.float64)
+
     def board(self) -> Any:
         """Return the board of markers, for OpenCV.
 
@@ -108,8 +115,9 @@ class Corners(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Corners (K, 2) that both cameras saw of the pattern at one place (px)."""
+    """Corners (K, 2) that both cameras saw of the pattern at one place (px), and their numbers (K,) on it."""
 
+    number: IntArray
     first: FloatArray
     second: FloatArray
 
@@ -213,7 +221,9 @@ def corners_of_place(pictures: Iterable[Picture], pattern: Pattern, where: str) 
         spread = max(spread, float(np.median(np.linalg.norm(seen - middle[k], axis=1))))
     extent = float(np.ptp(middle, axis=0).max())
     if spread > _STILL * extent:
-        raise DataError(f"the pattern moves ({spread:.1f} px): give a file for each place where it stands", where)
+        raise DataError(
+            f"the pattern moves ({spread:.1f} px): give a file for each place where it stands", where
+        )
     return Corners(numbers, middle)
 
 
@@ -225,9 +235,11 @@ def same_place(first: Corners, second: Corners, where: str) -> Place:
     """
     both, a, b = np.intersect1d(first.number, second.number, return_indices=True)
     if len(both) < _LEAST_CORNERS:
-        raise DataError(f"{len(both)} corners are seen by both cameras, and {_LEAST_CORNERS} are needed", where)
+        raise DataError(
+            f"{len(both)} corners are seen by both cameras, and {_LEAST_CORNERS} are needed", where
+        )
     one = Corners(both, first.xy[a])
-    return Place(one.xy, _turned_like(one, Corners(both, second.xy[b])).xy)
+    return Place(both, one.xy, _turned_like(one, Corners(both, second.xy[b])).xy)
 
 
 def _turned_like(model: Corners, other: Corners) -> Corners:
@@ -238,7 +250,9 @@ def _turned_like(model: Corners, other: Corners) -> Corners:
     return other if float(ahead @ there) >= 0.0 else Corners(other.number, other.xy[::-1])
 
 
-def map_of_places(places: Sequence[Place], width: float, own: tuple[float, float]) -> tuple[PictureMap, list[str]]:
+def map_of_places(
+    places: Sequence[Place], width: float, own: tuple[float, float]
+) -> tuple[PictureMap, list[str]]:
     """Fit the homography from the second camera's corners to the first's.
 
     Args:
@@ -276,5 +290,7 @@ def map_of_places(places: Sequence[Place], width: float, own: tuple[float, float
         f"the common picture to ± {unsure:.2g} px over the whole picture, where they are in the pattern's plane"
     ]
     if left > _ONE_PLANE_PX:
-        lines.append("the places do not lie in one plane: register by traffic, with this rig as --rig, does better")
+        lines.append(
+            "the places do not lie in one plane: register by traffic, with this rig as --rig, does better"
+        )
     return way, lines

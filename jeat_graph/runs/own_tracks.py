@@ -37,11 +37,13 @@ def own_tracks(detections: Detections, size_px: tuple[float, float] | None = Non
 
 
 def _whole(boxes: FloatArray, size_px: tuple[float, float]) -> BoolArray:
-    """Which boxes (N, 4) the picture's edge does not cut: of others neither size nor centre is seen."""
+    """Which boxes (N, 4) the picture's edge surely does not cut: of others neither size nor centre is seen."""
+    margin = _MARGIN * boxes[:, 2:]
     far = boxes[:, :2] + boxes[:, 2:]
-    return np.asarray((boxes[:, :2] > _EDGE_PX).all(axis=1) & (far < np.array(size_px) - _EDGE_PX).all(axis=1))
+    return np.asarray((boxes[:, :2] > margin).all(axis=1) & (far < np.array(size_px) - margin).all(axis=1))
 
 
 _STEPS_PER_DRAIN = 256
-# Boxes that end so near to the picture's edge are cut by it.
-_EDGE_PX = 2.0
+# The edge may cut boxes that end nearer to it than this share of their size: two standard deviations of usual
+# detectors.
+_MARGIN = 0.1

@@ -36,7 +36,9 @@ def board(kind: str) -> np.ndarray:
         drawn = np.full((6 * SQUARE, 8 * SQUARE), 255, np.uint8)
         for row in range(5):
             for column in range(7):
-                cv2.circle(drawn, ((column + 1) * SQUARE, (row + 1) * SQUARE), SQUARE // 3, 0, -1, cv2.LINE_AA)
+                cv2.circle(
+                    drawn, ((column + 1) * SQUARE, (row + 1) * SQUARE), SQUARE // 3, 0, -1, cv2.LINE_AA
+                )
     return cv2.copyMakeBorder(drawn, SQUARE, SQUARE, SQUARE, SQUARE, cv2.BORDER_CONSTANT, value=255)
 
 
@@ -206,7 +208,9 @@ def test_what_cannot_be_meant_is_refused(
 def test_corners_on_one_line_tell_no_map() -> None:
     line = np.column_stack([np.linspace(0, 600, 12), np.linspace(0, 300, 12)])
     drawn = board("checkerboard")
-    found = find_corners(seen(drawn, onto_picture(PLACES[0], drawn), COMMON), Pattern.parse("checkerboard:7x5"))
+    found = find_corners(
+        seen(drawn, onto_picture(PLACES[0], drawn), COMMON), Pattern.parse("checkerboard:7x5")
+    )
     assert found is not None
     place = same_place(found, found, "here")._replace(first=line, second=line)
     with pytest.raises(DataError, match="lie on one line"):

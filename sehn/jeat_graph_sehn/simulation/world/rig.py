@@ -38,7 +38,9 @@ class RigConfig:
 
     width: int = number(640, "px", "width of its picture", 16)
     height: int = number(480, "px", "height of its picture", 16)
-    focal_px: float = number(550.0, "px", "its focal length; the principal point is the middle", open_low=True)
+    focal_px: float = number(
+        550.0, "px", "its focal length; the principal point is the middle", open_low=True
+    )
     right_m: float = number(0.3, "m", "where it is, right of the RGB camera", -1000.0, 1000.0)
     down_m: float = number(0.0, "m", "where it is, below the RGB camera", -1000.0, 1000.0)
     forward_m: float = number(0.0, "m", "where it is, before the RGB camera", -1000.0, 1000.0)
@@ -135,7 +137,9 @@ class Rig:
             names[0]: {"image": list(size), "to_picture": "none"},
             names[1]: sensor_entry(way, clock, (self.own.width, self.own.height)),
         }
-        note = f"the true rig of a simulation; the matrix is right to {left:.2g} px for what stands on the road"
+        note = (
+            f"the true rig of a simulation; the matrix is right to {left:.2g} px for what stands on the road"
+        )
         return rig_text(size, sensors, [note])
 
 
