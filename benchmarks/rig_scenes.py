@@ -1,8 +1,8 @@
 """Two cameras side by side over one road, drawn at random: what `register` has to bring together.
 
-Road, traffic, cameras, clocks and detectors are the simulator's (`simulate --rig drawn`). Here stands what is
-drawn beyond a rig: how the first camera is mounted, the traffic, and detectors that err as real ones do: 4.5 % of
-the size, half of that variance for .7 s; they miss, and invent boxes.
+Road, traffic, cameras, clocks and detectors are the simulator's (`simulate --rig drawn`). Here stands what
+is drawn beyond a rig: how the first camera is mounted, the traffic, and detectors that err as real ones do:
+4.5 % of the size, half of that variance for .7 s; they miss, and invent boxes.
 """
 
 from __future__ import annotations

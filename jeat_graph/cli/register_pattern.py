@@ -14,12 +14,12 @@ from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
     from jeat_graph.data.picture_map import PictureMap
-    from jeat_graph.rig.pattern import Corners, Pattern, Picture, Place
+    from jeat_graph.rig.pattern import Corners, Pattern, PatternPlace, Picture
 
 _PICTURES = (".png", ".jpg", ".jpeg", ".bmp")
 _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v")
-# Pictures that are looked at of a video or of events in which the pattern stands still, and how long events are
-# counted for each (µs).
+# Pictures that are looked at of a video or of events in which the pattern stands still, and how long events
+# are counted for each (µs).
 _LOOKS, _WINDOW_US = 12, 250_000
 
 
@@ -59,8 +59,8 @@ def add_pattern(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--pattern",
         metavar="KIND:COLSxROWS",
-        help="what both cameras saw: checkerboard:9x6 (inner corners), circles:9x6, staggered-circles:4x11, or "
-        "charuco:8x6:4X4_50 (squares, markers)",
+        help="what both cameras saw: checkerboard:9x6 (inner corners), circles:9x6, staggered-circles:4x11, "
+        "or charuco:8x6:4X4_50 (squares, markers)",
     )
     group.add_argument(
         "--pattern-side",
@@ -75,9 +75,9 @@ def add_pattern(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=named_path,
         metavar="NAME=PATH",
-        help="pictures of the pattern by a sensor, its k-th place with the other's k-th: a picture, a video or a "
-        "file of events in which it stands still at one place, or a folder with a picture of each place; say "
-        "--view rgb=places/ --view evt=first.raw --view evt=second.raw",
+        help="pictures of the pattern by a sensor, its k-th place with the other's k-th: a picture, a video "
+        "or a file of events in which it stands still at one place, or a folder with a picture of each "
+        "place; say --view rgb=places/ --view evt=first.raw --view evt=second.raw",
     )
 
 
@@ -89,8 +89,8 @@ def map_of_pattern(args: argparse.Namespace, reference: str | None) -> PatternMa
         reference: the sensor whose picture is the common one; None for the one that is named first.
 
     Raises:
-        DataError: the views are not of two sensors, places are missing, the pattern is not found, or it tells no
-            map; names the file.
+        DataError: the views are not of two sensors, places are missing, the pattern is not found, or it
+            tells no map; names the file.
     """
     from jeat_graph.rig.pattern import Pattern, map_of_places
 
@@ -109,7 +109,8 @@ def map_of_pattern(args: argparse.Namespace, reference: str | None) -> PatternMa
     sizes = [_one_size(views) for views in seen]
     if len(seen[0]) != len(seen[1]):
         raise DataError(
-            f"{names[0]} saw the pattern at {len(seen[0])} places, {names[1]} at {len(seen[1])}: give as many of both"
+            f"{names[0]} saw the pattern at {len(seen[0])} places, {names[1]} at {len(seen[1])}: give as "
+            "many of both"
         )
     places = [_place(*pair) for pair in zip(*seen, strict=True)]
     if args.camera:
@@ -121,7 +122,7 @@ def map_of_pattern(args: argparse.Namespace, reference: str | None) -> PatternMa
 
 def _with_camera(
     args: argparse.Namespace,
-    places: list[Place],
+    places: list[PatternPlace],
     pattern: Pattern,
     reference: str,
     sizes: list[tuple[int, int]],
@@ -142,7 +143,7 @@ def _with_camera(
     return map_by_pattern(places, pattern, args.pattern_side, first, sizes[1])
 
 
-def _place(first: _Seen, second: _Seen) -> Place:
+def _place(first: _Seen, second: _Seen) -> PatternPlace:
     from jeat_graph.rig.pattern import same_place
 
     return same_place(first.corners, second.corners, f"{first.where} + {second.where}")

@@ -37,7 +37,8 @@ _POINTS_OF_A_PLACE = 4
 _STILL = 0.02
 # OpenCV counts from the middle of the first pixel, boxes from its edge.
 _HALF_PX = 0.5
-# Small or noisy patterns are looked for in pictures of twice the size, smoothed by so much (px), up to this width.
+# Small or noisy patterns are looked for in pictures of twice the size, smoothed by so much (px), up to this
+# width (px).
 _BLURS_PX, _WIDEST_ENLARGED_PX = (0.8, 1.2), 1400
 # A corner is sharpened within this share of the distance to the next one.
 _OWN_PART = 0.35
@@ -73,8 +74,8 @@ class Pattern(NamedTuple):
         good = kind in KINDS and columns.isdigit() and rows.isdigit() and (not dictionary or kind == CHARUCO)
         if not good or min(int(columns), int(rows)) < _LEAST_SIDE or int(columns) * int(rows) > 10_000:
             raise DataError(
-                f"a pattern must read like checkerboard:9x6 (inner corners), circles:9x6, staggered-circles:4x11 "
-                f"or charuco:8x6:4X4_50 (squares, markers), not {text!r}"
+                "a pattern must read like checkerboard:9x6 (inner corners), circles:9x6, "
+                f"staggered-circles:4x11 or charuco:8x6:4X4_50 (squares, markers), not {text!r}"
             )
         if kind in (CHECKERBOARD, CIRCLES) and columns == rows:
             raise DataError(f"{text}: a pattern with as many columns as rows looks alike from four sides")
@@ -84,7 +85,7 @@ class Pattern(NamedTuple):
         return found
 
     def points(self, number: IntArray) -> FloatArray:
-        """Return where corners (K,) lie on the pattern (K, 2), in sides of a square or distances of circles."""
+        """Return where corners (K,) lie on the pattern (K, 2): sides of a square, or distances of circles."""
         columns = self.columns - 1 if self.kind == CHARUCO else self.columns
         row, column = number // columns, number % columns
         across = 2 * column + row % 2 if self.kind == STAGGERED else column
@@ -114,7 +115,7 @@ class Corners(NamedTuple):
     xy: FloatArray
 
 
-class Place(NamedTuple):
+class PatternPlace(NamedTuple):
     """Corners (K, 2) that both cameras saw of the pattern at one place (px), and their numbers (K,) on it."""
 
     number: IntArray
@@ -123,7 +124,7 @@ class Place(NamedTuple):
 
 
 def find_corners(picture: Picture, pattern: Pattern) -> Corners | None:
-    """Find a pattern in a picture (H, W) or (H, W, 3), bright on dark or dark on bright; None if it is not there.
+    """Find a pattern in a picture (H, W) or (H, W, 3), dark on bright or inverted; None if it is not there.
 
     Corners are numbered along rows; of all but `charuco` the first may be that of either end of the pattern.
     """
@@ -138,7 +139,7 @@ def find_corners(picture: Picture, pattern: Pattern) -> Corners | None:
 
 
 def _looks(grey: Picture) -> Iterator[tuple[int, Picture]]:
-    """The picture (H, W) as it is, larger and smoother for small or noisy patterns, and inverted; with its scale."""
+    """The picture (H, W) with its scale: as it is, larger and smooth for small patterns, and inverted."""
     import cv2
 
     yield 1, grey
@@ -227,7 +228,7 @@ def corners_of_place(pictures: Iterable[Picture], pattern: Pattern, where: str) 
     return Corners(numbers, middle)
 
 
-def same_place(first: Corners, second: Corners, where: str) -> Place:
+def same_place(first: Corners, second: Corners, where: str) -> PatternPlace:
     """Pair the corners that two cameras saw of one pattern; they must not be rolled by 90° or more.
 
     Raises:
@@ -239,7 +240,7 @@ def same_place(first: Corners, second: Corners, where: str) -> Place:
             f"{len(both)} corners are seen by both cameras, and {_LEAST_CORNERS} are needed", where
         )
     one = Corners(both, first.xy[a])
-    return Place(both, one.xy, _turned_like(one, Corners(both, second.xy[b])).xy)
+    return PatternPlace(both, one.xy, _turned_like(one, Corners(both, second.xy[b])).xy)
 
 
 def _turned_like(model: Corners, other: Corners) -> Corners:
@@ -251,7 +252,7 @@ def _turned_like(model: Corners, other: Corners) -> Corners:
 
 
 def map_of_places(
-    places: Sequence[Place], width: float, own: tuple[float, float]
+    places: Sequence[PatternPlace], width: float, own: tuple[float, float]
 ) -> tuple[PictureMap, list[str]]:
     """Fit the homography from the second camera's corners to the first's.
 
@@ -281,13 +282,14 @@ def map_of_places(
     unsure = way.std_px(own)
     if unsure > _MOST_UNSURE * width:
         raise DataError(
-            f"the corners tell the map to ± {unsure:.0f} px only over the whole picture: show the pattern at more "
-            "places, also near the picture's corners"
+            f"the corners tell the map to ± {unsure:.0f} px only over the whole picture: show the pattern at "
+            "more places, also near the picture's corners"
         )
     at = "one place" if len(places) == 1 else f"{len(places)} places"
     lines = [
-        f"{len(first)} corners of the pattern at {at}, {left:.2g} px left between them; boxes go to "
-        f"the common picture to ± {unsure:.2g} px over the whole picture, where they are in the pattern's plane"
+        f"{len(first)} corners of the pattern at {at}, {left:.2g} px left between them; boxes go "
+        f"to the common picture to ± {unsure:.2g} px over the whole picture, where they are in the pattern's "
+        "plane"
     ]
     if left > _ONE_PLANE_PX:
         lines.append(

@@ -1,8 +1,11 @@
 """A second camera over the road, from a pattern of known size that it and a calibrated first one saw.
 
-The first camera's file says where it is over the road. The pattern at several places, tilted in several ways,
-tells the second one's focal length and how it stands beside the first; so it is over the road, too, and boxes go
-from picture to picture with parallax. Zhang, A flexible new technique for camera calibration, TPAMI 2000.
+The first camera's file says where it is over the road. The pattern at several places, tilted in several
+ways, tells the second one's focal length and how it stands beside the first; so it is over the road, too, and
+boxes go from picture to picture with parallax.
+
+References:
+    Zhang, *A flexible new technique for camera calibration*, PAMI 22, 2000.
 """
 
 from __future__ import annotations
@@ -14,7 +17,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.picture_map import PictureMap
-from jeat_graph.rig.pattern import Pattern, Place
+from jeat_graph.rig.pattern import Pattern, PatternPlace
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.camera_map import map_between
 
@@ -24,12 +27,13 @@ LEAST_PLACES = 4
 _MOST_LEFT_PX = 2.0
 # The map must be known to this share of the common picture's width.
 _MOST_UNSURE = 0.004
+_UNTOLD = "the places do not tell the second camera"
 _GRID = 6
 _TALL_PX = 40.0  # of the boxes by which maps are compared
 
 
 def camera_by_pattern(
-    places: Sequence[Place], pattern: Pattern, side_m: float, first: RoadCamera, size: tuple[int, int]
+    places: Sequence[PatternPlace], pattern: Pattern, side_m: float, first: RoadCamera, size: tuple[int, int]
 ) -> tuple[RoadCamera, float]:
     """Find the second camera.
 
@@ -67,9 +71,7 @@ def camera_by_pattern(
             board, ours, theirs, K1, bent, K2, bent2, size, flags=cv2.CALIB_FIX_INTRINSIC
         )
     except cv2.error:
-        raise DataError(
-            "the places do not tell the second camera: tilt the pattern at each in another way"
-        ) from None
+        raise DataError(f"{_UNTOLD}: tilt the pattern at each in another way") from None
     k = np.asarray(bent2).ravel()
     try:
         second = RoadCamera(
@@ -79,17 +81,17 @@ def camera_by_pattern(
             position=first.position - first.rotation.T @ R.T @ np.asarray(T).ravel(),
         )
     except DataError as error:
-        raise DataError(f"the places do not tell the second camera: {error.message}") from None
+        raise DataError(f"{_UNTOLD}: {error.message}") from None
     return second, float(left)
 
 
 def map_by_pattern(
-    places: Sequence[Place], pattern: Pattern, side_m: float, first: RoadCamera, size: tuple[int, int]
+    places: Sequence[PatternPlace], pattern: Pattern, side_m: float, first: RoadCamera, size: tuple[int, int]
 ) -> tuple[PictureMap, list[str]]:
     """Find the map with parallax from the second camera's picture to the first's, and how sure it is.
 
-    Its uncertainty is how much it changes when each place is left out (the jackknife), and what no matrix can do.
-    Arguments are those of `camera_by_pattern`.
+    Its uncertainty is how much it changes when each place is left out (the jackknife), and what no matrix can
+    do. Arguments are those of `camera_by_pattern`.
 
     Returns:
         The map with covariance, and lines to be said.
@@ -104,8 +106,8 @@ def map_by_pattern(
     second, left = camera_by_pattern(places, pattern, side_m, first, size)
     if left > _MOST_LEFT_PX:
         raise DataError(
-            f"{left:.1f} px are left between corners and cameras: did the pattern move, is --pattern-side right, and "
-            "the camera's file?"
+            f"{left:.1f} px are left between corners and cameras: did the pattern move, is --pattern-side "
+            "right, and the camera's file?"
         )
     way, shape_px = map_between(second, first)
     without = []
@@ -116,20 +118,20 @@ def map_by_pattern(
     apart = np.stack(without) - np.mean(without, axis=0)
     good = np.isfinite(apart).all(axis=(0, 2))
     if not good.any():
-        raise DataError("the places do not tell the second camera: show the pattern at more places")
+        raise DataError(f"{_UNTOLD}: show the pattern at more of them")
     unsure = float(np.sqrt((count - 1) / count * (apart[:, good] ** 2).sum(axis=0).mean()))
     if unsure > _MOST_UNSURE * first.width:
         raise DataError(
-            f"the places tell the map to ± {unsure:.0f} px only: show the pattern at more places, near and far, each "
-            "tilted in another way"
+            f"the places tell the map to ± {unsure:.0f} px only: show the pattern at more places, near and "
+            "far, each tilted in another way"
         )
     covariance = np.zeros((11, 11))
     covariance[2, 2] = covariance[6, 6] = shape_px**2 + unsure**2
     baseline = float(np.linalg.norm(second.position - first.position))
     lines = [
-        f"a focal length of {second.fx:.1f} px, {baseline:.3f} m beside the other camera, by the pattern at {count} "
-        f"places ({left:.2g} px left between corners); boxes go to the common picture to ± {unsure:.2g} px, with "
-        "parallax"
+        f"a focal length of {second.fx:.1f} px, {baseline:.3f} m beside the other camera, by the pattern at "
+        f"{count} places ({left:.2g} px left between corners); boxes go to the common picture to "
+        f"± {unsure:.2g} px, with parallax"
     ]
     return PictureMap(way.matrix, covariance), lines
 

@@ -37,7 +37,7 @@ def own_tracks(detections: Detections, size_px: tuple[float, float] | None = Non
 
 
 def _whole(boxes: FloatArray, size_px: tuple[float, float]) -> BoolArray:
-    """Which boxes (N, 4) the picture's edge surely does not cut: of others neither size nor centre is seen."""
+    """Which boxes (N, 4) the picture's edge does not cut: of others neither size nor centre is seen."""
     margin = _MARGIN * boxes[:, 2:]
     far = boxes[:, :2] + boxes[:, 2:]
     return np.asarray((boxes[:, :2] > margin).all(axis=1) & (far < np.array(size_px) - margin).all(axis=1))

@@ -43,7 +43,7 @@ def board(kind: str) -> np.ndarray:
 
 
 def onto_picture(place: tuple[int, int, int, int], drawn: np.ndarray) -> np.ndarray:
-    """The homography (3, 3) from the board's pixels to the common picture, both counted from pixels' edges."""
+    """The homography (3, 3) from the board's pixels to the common picture's, counted from pixels' edges."""
     left, top, size, turn = place
     height, width = drawn.shape
     scale = size / width
@@ -116,7 +116,7 @@ def test_the_reference_turns_the_map_round(tmp_path: Path) -> None:
 
 
 def test_events_of_a_blinking_pattern_are_as_good_as_pictures(tmp_path: Path) -> None:
-    """Only what is white blinks; each of its pixels has some events at each change, and any may have noise."""
+    """Only what is white blinks; each of its pixels has some events at each change, and any may have more."""
     views = write_views(tmp_path, "checkerboard")[:2]
     drawn = board("checkerboard")
     for k, place in enumerate(PLACES):

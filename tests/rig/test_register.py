@@ -92,7 +92,7 @@ def test_an_earlier_rig_is_sharpened(road: Recorded, rig: Path, tmp_path: Path, 
     ("kind", "seed", "why"),
     [
         ("lane", 100, "does not tell"),
-        ("lane", 300, "one lane"),
+        ("lane", 301, "one lane"),
         ("lane", 305, "quite another difference: record longer"),
         ("apart", 101, "look at different roads, or did not record at one time"),
     ],

@@ -12,7 +12,7 @@ from jeat_graph import load_config
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.picture_map import PictureMap
-from jeat_graph.rig.pattern import Pattern, Place
+from jeat_graph.rig.pattern import Pattern, PatternPlace
 from jeat_graph.road.camera import RoadCamera, mounted, turn
 from jeat_graph.road.camera_file import write_camera
 from jeat_graph.road.pattern_pose import camera_by_pattern, map_by_pattern
@@ -42,7 +42,7 @@ HELD = (
 
 
 def board_in_world(held: tuple[tuple[float, ...], tuple[float, ...]]) -> np.ndarray:
-    """(3, 3): columns take (across, down, 1) on the board, m from its first inner corner, to the road's axes."""
+    """(3, 3): takes (across, down, 1) on the board, m from its first inner corner, to the road's axes."""
     place, turned = (np.array(one) for one in held)
     R = turn(turned)
     origin = place + R @ [-3 * SIDE, -2 * SIDE, 0.0]
@@ -56,7 +56,7 @@ def homography(camera: RoadCamera, board: np.ndarray) -> np.ndarray:
     return np.asarray(K @ camera.rotation @ (board - np.outer(camera.position, [0, 0, 1.0])))
 
 
-def places(noise_px: float, held=HELD) -> list[Place]:
+def places(noise_px: float, held=HELD) -> list[PatternPlace]:
     rng = np.random.default_rng(2)
     number = np.arange(35)
     board = np.column_stack([PATTERN.points(number) * SIDE, np.ones(35)])
@@ -64,7 +64,7 @@ def places(noise_px: float, held=HELD) -> list[Place]:
     for one in held:
         shown = [board @ homography(camera, board_in_world(one)).T for camera in (FIRST, SECOND)]
         pixels = [rows[:, :2] / rows[:, 2:] + rng.normal(0.0, noise_px, (35, 2)) for rows in shown]
-        found.append(Place(number, *pixels))
+        found.append(PatternPlace(number, *pixels))
     return found
 
 
@@ -98,7 +98,7 @@ def test_noisy_corners_tell_the_map_as_well_as_they_say() -> None:
 def test_boards_that_all_face_the_camera_are_refused() -> None:
     """Without tilt, distance and focal length are one number."""
     flat = tuple((place, (0.0, 0.0, 0.0)) for place, _ in HELD)
-    with pytest.raises(DataError, match="places|corners"):
+    with pytest.raises(DataError, match=r"places|corners"):
         map_by_pattern(places(0.3, flat), PATTERN, SIDE, FIRST, (640, 480))
 
 
@@ -127,7 +127,7 @@ def test_the_command_finds_the_map_from_pictures(tmp_path: Path, capsys: pytest.
     row, column = np.mgrid[:6, :8]
     drawn = np.kron((row + column) % 2 * 255, np.ones((square, square))).astype(np.uint8)
     drawn = cv2.copyMakeBorder(drawn, square, square, square, square, cv2.BORDER_CONSTANT, value=255)
-    # The board's first inner corner is two squares from the drawing's edge; OpenCV counts from pixels' middles.
+    # The first inner corner is two squares from the drawing's edge; OpenCV counts from pixels' middles.
     to_m = np.array([[1, 0, -2.0 * square], [0, 1, -2.0 * square], [0, 0, square / SIDE]]) * SIDE / square
     half = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1.0]])
     fine = np.diag([3.0, 3.0, 1.0])

@@ -61,9 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     only.add_argument(
         "--rig",
         metavar="drawn|FILE",
-        help="the event camera gets a place, lens, picture and clock of its own: drawn from the seed, or as a "
-        "YAML file says, such as {right_m: 0.3, width: 640, height: 480, focal_px: 550, offset_s: 2.5}; the "
-        "true rig.yaml is written beside",
+        help="the event camera gets a place, lens, picture and clock of its own: drawn from the seed, or as "
+        "a YAML file says, such as {right_m: 0.3, width: 640, height: 480, focal_px: 550, offset_s: 2.5}; "
+        "the true rig.yaml is written beside",
     )
     pictures = parser.add_argument_group(
         "with --sensors pictures or carla",

@@ -64,7 +64,7 @@ def record(
         rig: the second camera, that of the sensor `evt`; `drawn` draws one from the seed.
 
     Raises:
-        ConfigError: a seed, a duration or a rig that is not valid, or more traffic than the road has room for.
+        ConfigError: a seed, a duration or a rig that is not valid, or more traffic than there is road.
     """
     if seed < 0:
         raise ConfigError(f"seed: must not be negative, got {seed}")

@@ -208,8 +208,9 @@ def _check_rig(root: Path, truth: GroundTruth) -> Iterator[str]:
         return
     own = read_truth(root / RIG_TRUTH)
     yield from _outside(root / RIG_TRUTH, own.boxes, size)
-    if len(own.frame_times()) != len(truth.frame_times()):
-        yield f"{root / RIG_TRUTH}: {len(own.frame_times())} frames, but {TRUTH} has {len(truth.frame_times())}"
+    ours, theirs = len(truth.frame_times()), len(own.frame_times())
+    if ours != theirs:
+        yield f"{root / RIG_TRUTH}: {theirs} frames, but {TRUTH} has {ours}"
 
 
 def _check_detections(root: Path, manifest: dict[str, Any]) -> Iterator[str]:

@@ -6,7 +6,7 @@ The RGB camera is the scenario's. Its picture and its clock are the common ones,
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 

@@ -57,7 +57,7 @@ def about(axis: int, degrees: float) -> np.ndarray:
 
 def pinhole(camera: CameraConfig, rig: RigConfig) -> np.ndarray:
     """The event camera's 3 x 4 matrix, from turns about the cameras' own axes X right, Y down, Z forward."""
-    # Level and facing along the road, then turned, tilted and rolled, each about the axes as they are by then.
+    # Level and facing along the road, then turned, tilted, rolled, each about the axes as they are by then.
     level = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
     def mounted(pitch: float, yaw: float, roll: float) -> np.ndarray:
