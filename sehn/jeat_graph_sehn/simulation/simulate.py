@@ -14,15 +14,13 @@ from jeat_graph_sehn.simulation.sensors.detector import detect
 from jeat_graph_sehn.simulation.sensors.timing import Clock, run_clock
 from jeat_graph_sehn.simulation.streams import stream
 from jeat_graph_sehn.simulation.world.camera import Camera
-from jeat_graph_sehn.simulation.world.rig import Rig, RigConfig, draw_rig
+from jeat_graph_sehn.simulation.world.rig import DRAWN, Rig, RigConfig, draw_rig
 from jeat_graph_sehn.simulation.world.scene import Scene
 from jeat_graph_sehn.simulation.world.traffic import TrafficConfig
 from jeat_graph_sehn.simulation.world.truth import Views, look
 from jeat_graph_sehn.simulation.world.vehicles import KINDS
 
 DEFAULT_DURATION_S = 30.0
-#: What asks for a rig that is drawn.
-DRAWN = "drawn"
 #: The sensor that is the second camera of a rig.
 RIG_SENSOR = "evt"
 _DIGITS = 6  # of the truth's columns, so that a file holds exactly what is in memory

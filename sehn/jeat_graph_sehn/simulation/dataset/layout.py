@@ -38,6 +38,7 @@ TRUTH = "gt.csv"
 DETECTIONS = "detections.csv"  # of a simulation at the level of detections
 TRUTH_ROAD = "gt_road.csv"  # where the vehicles are on the road, beside the truth in the picture
 RIG = "rig.yaml"  # of a simulation with two lenses: how picture and clock of the second lie to the first's
+RIGS = "rigs"  # the same of every segment, beside the sets of both cameras
 RIG_CAMERA = "camera_evt.yaml"  # its pose, in the axes of `camera.yaml`
 RIG_TRUTH = "gt_evt.csv"  # the truth of the same moments in its own picture and on its own clock
 VEHICLES = "vehicles.csv"

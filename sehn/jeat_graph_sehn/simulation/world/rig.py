@@ -19,6 +19,8 @@ from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.camera_map import map_between
 from jeat_graph_sehn.simulation.world.camera import Camera, turned
 
+#: What asks for a rig that is drawn.
+DRAWN = "drawn"
 _TICK_DIGITS = 6  # clocks tell microseconds
 _PPM = 1e-6
 
@@ -117,7 +119,7 @@ class Rig:
         other = (abs(late), duration_s)
         return (early, other) if late >= 0.0 else (other, early)
 
-    def text(self, names: tuple[str, str]) -> str:
+    def text(self, names: tuple[str, str], lens: tuple[float, float] = (0.0, 0.0)) -> str:
         """Return the rig as `rig.yaml` has it.
 
         No matrix is exact for all that stands on a road: this is the one nearest to both cameras, and what it
@@ -125,11 +127,12 @@ class Rig:
 
         Args:
             names: of the RGB and of the event sensor.
+            lens: radial distortion of both, k1 and k2.
 
         Raises:
             DataError: the cameras do not see the same road.
         """
-        way, left = map_between(_road_camera(self.own), _road_camera(self.common))
+        way, left = map_between(_road_camera(self.own, lens), _road_camera(self.common, lens))
         c = self.config
         clock = ClockConfig(offset_s=c.offset_s, drift_ppm=c.drift_ppm, at_s=c.at_s)
         size = (self.common.width, self.common.height)
@@ -169,6 +172,6 @@ def draw_rig(rng: np.random.Generator, camera: Camera) -> RigConfig:
     )
 
 
-def _road_camera(camera: Camera) -> RoadCamera:
-    lens = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
-    return RoadCamera(*lens, 0.0, 0.0, rotation=camera.rotation, position=camera.position)
+def _road_camera(camera: Camera, lens: tuple[float, float]) -> RoadCamera:
+    pinhole = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy)
+    return RoadCamera(*pinhole, *lens, rotation=camera.rotation, position=camera.position)

@@ -16,9 +16,9 @@ from jeat_graph.io.tables.detections_io import read_detections
 from jeat_graph.io.tables.truth_io import read_truth
 from jeat_graph.rig.common_picture import CommonPicture, common_time
 from jeat_graph_sehn.simulation.scenario import Scenario, load_scenario
-from jeat_graph_sehn.simulation.simulate import DRAWN, SimulatedRecording, record
+from jeat_graph_sehn.simulation.simulate import SimulatedRecording, record
 from jeat_graph_sehn.simulation.world.camera import Camera, CameraConfig
-from jeat_graph_sehn.simulation.world.rig import Rig, RigConfig, draw_rig
+from jeat_graph_sehn.simulation.world.rig import DRAWN, Rig, RigConfig, draw_rig
 
 CONFIG = RigConfig(
     width=1024,
