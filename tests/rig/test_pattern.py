@@ -8,12 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.rig_scenes import draw_scene, judge, true_offset
 from jeat_graph import load_config
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.tables.detections_io import write_detections
 from jeat_graph.rig.pattern import Pattern, find_corners, map_of_places, picture_of_counts, same_place
 
 COMMON, OWN = (1280, 720), (640, 480)
@@ -221,3 +223,27 @@ def test_pixels_that_never_rest_do_not_darken_the_others() -> None:
     counts = np.full((40, 40), 10)
     counts[0, 0] = 100_000
     assert picture_of_counts(counts)[20, 20] == 255
+
+
+def test_a_pattern_tells_the_picture_and_traffic_the_clock(tmp_path: Path) -> None:
+    """Boards of 8 m at the height of bonnets, for boxes' middles are above the road."""
+    scene, drawn = draw_scene(14), board("checkerboard")
+    height, width = drawn.shape
+    ends = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+    files = [str(tmp_path / f"{name}.csv") for name in ("rgb", "evt")]
+    command = ["register", *files]
+    for name, camera, size in zip(("rgb", "evt"), scene.cameras, scene.sizes, strict=True):
+        write_detections(scene.detections(name == "evt"), tmp_path / f"{name}.csv")
+        (tmp_path / name).mkdir()
+        for k, (x, y) in enumerate(((0.0, 15.0), (5.0, 16.0), (3.0, 24.0), (1.5, 19.0), (2.5, 14.5))):
+            corners = np.array([[x - 4, y + 8, 0.7], [x + 4, y + 8, 0.7], [x + 4, y, 0.7], [x - 4, y, 0.7]])
+            H = cv2.getPerspectiveTransform(ends, camera.project(corners)[0].astype(np.float32))
+            cv2.imwrite(str(tmp_path / name / f"{k}.png"), seen(drawn, H, size))
+        command += ["--view", f"{name}={tmp_path / name}"]
+    out = tmp_path / "rig.yaml"
+    assert main([*command, "--pattern", "checkerboard:7x5", "--out", str(out)]) == 0
+    sensor = load_config(rig=out).sensors["evt"]
+    assert sensor.clock is not None
+    assert abs(sensor.clock.offset_s - true_offset(scene, sensor.clock.at_s)) < 0.02
+    errors = judge(scene, PictureMap.of_numbers(np.array(sensor.to_picture)))
+    assert np.sqrt(np.mean(errors["car"] ** 2)) < 2.0

@@ -308,7 +308,8 @@ def _rig(given: str | None) -> RigConfig | str | None:
 
     if given is None or given == DRAWN:
         return given
-    return build(RigConfig, _read_yaml(Path(given)), "")
+    found: RigConfig = build(RigConfig, _read_yaml(Path(given)), "")
+    return found
 
 
 def _verify(folder: Path) -> int:

@@ -127,4 +127,4 @@ class RigEventSource(RenderedSource):
 
 def _reading_us(rig: Rig, t_us: IntArray) -> IntArray:
     """What the event camera's clock shows (N,) at common times (N,) in µs."""
-    return np.asarray(np.rint(1e6 * rig.reading(1e-6 * t_us)).astype(np.int64))
+    return np.asarray(np.rint(1e6 * rig.reading(1e-6 * t_us.astype(np.float64))).astype(np.int64))
