@@ -261,7 +261,7 @@ def _map_of_cameras(cameras: dict[str, str], names: tuple[str, str]) -> tuple[Pi
 
     common, own = (read_camera(cameras[name]) for name in names)
     way, left = map_between(own, common)
-    return way, [f"the cameras' files tell the map, to {left:.2g} px for what stands on the road"]
+    return way, [f"the cameras' files tell the map, to {left:.2g} px for vehicles on the road"]
 
 
 def _camera_size(file: str) -> tuple[int, int]:

@@ -140,9 +140,7 @@ class Rig:
             names[0]: {"image": list(size), "to_picture": "none"},
             names[1]: sensor_entry(way, clock, (self.own.width, self.own.height)),
         }
-        note = (
-            f"the true rig of a simulation; the matrix is right to {left:.2g} px for what stands on the road"
-        )
+        note = f"the true rig of a simulation; the matrix is right to {left:.2g} px for vehicles"
         return rig_text(size, sensors, [note])
 
 
