@@ -68,8 +68,8 @@ def logit(score: FloatArray) -> FloatArray:
 def box_probability(boxes: FloatArray, logits: FloatArray, indifference: float) -> FloatArray:
     """Return the probability (M,) of each box to be an object by itself, whatever is tracked there.
 
-    Its odds are those of its score, times 1 − IoU with the most overlapping better box of the scan: of two boxes
-    at one place the worse one is mostly a second box of the same object.
+    Its odds are those of its score, times 1 − IoU with the most overlapping better box of the scan: of two
+    boxes at one place the worse one is mostly a second box of the same object.
 
     Args:
         boxes: (M, 4) left, top, right, bottom of one scan (px).

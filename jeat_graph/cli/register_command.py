@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from jeat_graph.cli.options import add_image, add_reading, add_rig, reading
 from jeat_graph.cli.progress import stages
+from jeat_graph.cli.register_pattern import add_pattern, map_of_pattern, named_path
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import picture_size
 from jeat_graph.data.errors import DataError
 
 if TYPE_CHECKING:
+    from jeat_graph.cli.register_pattern import PatternMap
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections
     from jeat_graph.data.picture_map import PictureMap
@@ -27,8 +29,6 @@ HELP = (
     "from corresponding points, and write a rig for track, stream and calibrate"
 )
 _say = partial(say, "register")
-#: Digits of what is written: boxes are good to a hundredth of a pixel, clocks to a microsecond.
-_DIGITS, _TIME_PLACES = 9, 6
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,9 +36,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add(
         "detections",
-        nargs="+",
+        nargs="*",
         metavar="DETECTIONS",
-        help="files of detections, one a sensor or with several; each in its sensor's own picture and clock",
+        help="files of detections, one a sensor or with several; each in its sensor's own picture and clock "
+        "(with --pattern they may be left out, and tell the clock if they are there)",
     )
     add("--out", required=True, metavar="RIG.yaml", help="the rig to write")
     add(
@@ -64,23 +65,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--camera",
         action="append",
         default=[],
-        type=_named_file,
+        type=named_path,
         metavar="NAME=CAMERA.yaml",
         help="calibrated camera of a sensor over the road, one for each of two sensors, in the same axes",
     )
+    add_pattern(parser)
     add_rig(parser)
     add_reading(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Register every other sensor with the reference, and write the rig if all of it is known."""
-    from jeat_graph.config.rig_file import rig_text
-    from jeat_graph.io.files.atomic import check_writable, open_atomic
+    from jeat_graph.io.files.atomic import check_writable
     from jeat_graph.io.tables.detections_io import read_many
 
     if Path(args.out).suffix not in (".yaml", ".yml"):
         raise DataError("the name of a rig must end in .yaml", args.out)
     check_writable(args.out)
+    _check_ways(args)
+    if not args.detections:
+        return _write_pattern(args, map_of_pattern(args, args.reference))
     recording = read_many(args.detections, **{**reading(args), "image": None})
     reference = _reference(args, recording)
     others = [name for name in recording.sensors if name != reference]
@@ -88,11 +92,16 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(
             f"there is one sensor, {reference!r}: a rig has two or more", " + ".join(args.detections)
         )
-    if args.camera and {name for name, _ in args.camera} != set(recording.sensors):
+    if args.camera and args.pattern is None and {name for name, _ in args.camera} != set(recording.sensors):
         raise DataError(f"--camera is needed of each sensor: {', '.join(recording.sensors)}")
     if args.points is not None and len(others) > 1:
         raise DataError("corresponding points are of two sensors, and there are more", args.points)
-    sizes = _sizes(args, recording, reference)
+    pattern = None
+    if args.pattern is not None:
+        if {name for name, _ in args.view} != set(recording.sensors):
+            raise DataError(f"--view is needed of each sensor: {', '.join(recording.sensors)}")
+        pattern = map_of_pattern(args, reference)
+    sizes = _sizes(args, recording, reference, pattern)
     known = _known(args)
     with stages("register", 2 * len(others) + 1) as stage:
         stage(f"tracking {reference}")
@@ -103,21 +112,59 @@ def run(args: argparse.Namespace) -> int:
             second = _tracks(recording, name, sizes[name])
             stage(f"registering {name}")
             pair = (sizes[reference], sizes[name])
-            found[name] = _register(args, first, second, (reference, name), pair, known)
+            found[name] = _register(args, first, second, (reference, name), pair, known, pattern)
+    return _write(args, reference, sizes, found)
+
+
+def _write(
+    args: argparse.Namespace,
+    reference: str,
+    sizes: dict[str, tuple[int, int]],
+    found: dict[str, Registration],
+) -> int:
+    """Say what was found, and write the rig."""
+    from jeat_graph.config.rig_file import rig_text, sensor_entry
+    from jeat_graph.io.files.atomic import open_atomic
+
     for one in found.values():
         for line in one.lines:
             _say(line)
     width, height = sizes[reference]
     sensors: dict[str, dict[str, Any]] = {reference: {"image": [width, height], "to_picture": "none"}}
-    sensors |= {name: _entry(one, sizes[name]) for name, one in found.items()}
+    sensors |= {name: sensor_entry(one.way, one.clock, sizes[name]) for name, one in found.items()}
+    sources = args.detections or [path for _, path in args.view]
     notes = [
-        f"made by jeat-graph register of {' + '.join(args.detections)}",
+        f"made by jeat-graph register of {' + '.join(sources)}",
         *(line for one in found.values() for line in one.lines),
     ]
     with open_atomic(args.out) as file:
         file.write(rig_text((width, height), sensors, notes))
     print(f"wrote {args.out}")
     return 0
+
+
+def _check_ways(args: argparse.Namespace) -> None:
+    """Refuse more than one source of the map, and options that only mean something with another."""
+    if not args.detections and args.pattern is None:
+        raise DataError("DETECTIONS are needed, or a --pattern with --view NAME=PATH of two sensors")
+    if args.view and args.pattern is None:
+        raise DataError("--view shows a pattern: say which with --pattern, such as checkerboard:9x6")
+    if args.pattern_side is not None and not (args.pattern and args.camera):
+        raise DataError("--pattern-side goes with --pattern and --camera NAME=CAMERA.yaml of the reference")
+    other = args.pattern or args.camera
+    if args.points is not None and other:
+        name = "pattern" if args.pattern else "camera"
+        raise DataError(f"--{name} and --points both tell the map: give one of them")
+
+
+def _write_pattern(args: argparse.Namespace, pattern: PatternMap) -> int:
+    """Write what a pattern tells, without any traffic."""
+    from jeat_graph.rig.registering import Registration
+
+    reference, name = pattern.names
+    lines = [*pattern.lines, "no detections, so no clock: give them, or write offset_s into the rig"]
+    found = {name: Registration(pattern.way, None, [f"{name}: {line}" for line in lines])}
+    return _write(args, reference, dict(zip(pattern.names, pattern.sizes, strict=True)), found)
 
 
 def _reference(args: argparse.Namespace, recording: Detections) -> str:
@@ -133,12 +180,16 @@ def _reference(args: argparse.Namespace, recording: Detections) -> str:
     return first.sensors[-1] if "rgb" not in first.sensors else "rgb"
 
 
-def _sizes(args: argparse.Namespace, recording: Detections, reference: str) -> dict[str, tuple[int, int]]:
+def _sizes(
+    args: argparse.Namespace, recording: Detections, reference: str, pattern: PatternMap | None
+) -> dict[str, tuple[int, int]]:
     """Width and height of each sensor's picture, given or as far as its boxes reach."""
     from jeat_graph.config.reading import load_config
     from jeat_graph.runs.declaring import fit_picture
 
     given = {name: _camera_size(file) for name, file in args.camera} | dict(args.sensor_image)
+    if pattern is not None:
+        given |= dict(zip(pattern.names, pattern.sizes, strict=True))
     if args.image is not None:
         given[reference] = args.image
     strange = [name for name in given if name not in recording.sensors]
@@ -178,12 +229,15 @@ def _register(
     names: tuple[str, str],
     sizes: tuple[tuple[int, int], tuple[int, int]],
     known: Config | None,
+    pattern: PatternMap | None,
 ) -> Registration:
     from jeat_graph.rig.points import map_of_points, read_points
     from jeat_graph.rig.registering import Registration, clock_by_map, register_by_traffic
 
     if args.points is not None:
         way, lines = map_of_points(*read_points(args.points, names), sizes[0], args.points)
+    elif pattern is not None:
+        way, lines = pattern.way, list(pattern.lines)
     elif args.camera:
         way, lines = _map_of_cameras(dict(args.camera), names)
     else:
@@ -207,7 +261,7 @@ def _map_of_cameras(cameras: dict[str, str], names: tuple[str, str]) -> tuple[Pi
 
     common, own = (read_camera(cameras[name]) for name in names)
     way, left = map_between(own, common)
-    return way, [f"the cameras' files tell the map, to {left:.2g} px for what stands on the road"]
+    return way, [f"the cameras' files tell the map, to {left:.2g} px for vehicles on the road"]
 
 
 def _camera_size(file: str) -> tuple[int, int]:
@@ -231,40 +285,8 @@ def _start(known: Config | None, name: str) -> MatchedTracks | None:
     return MatchedTracks(no_tracks(), no_tracks(), way.picture, offset, 0)
 
 
-def _entry(found: Registration, size: tuple[int, int]) -> dict[str, Any]:
-    """What a rig says of a sensor."""
-    columns = 4 if found.way.parallax else 3
-    kept = [k for k in range(11) if columns == 4 or k not in (3, 7, 10)]
-    covariance = found.way.covariance[kept][:, kept]
-    out: dict[str, Any] = {
-        "image": list(size),
-        "to_picture": [[_short(v) for v in row[:columns]] for row in found.way.matrix],
-        "covariance": [[_short(v) for v in row] for row in covariance],
-    }
-    if found.clock is not None:
-        out |= {
-            "offset_s": round(found.clock.offset_s, _TIME_PLACES),
-            "offset_std_s": round(found.clock.offset_std_s, _TIME_PLACES),
-            "drift_ppm": round(found.clock.drift_ppm, 3),
-            "drift_std_ppm": round(found.clock.drift_std_ppm, 3),
-            "at_s": round(found.clock.at_s, _TIME_PLACES),
-        }
-    return out
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
-
-
 def _named_size(text: str) -> tuple[str, tuple[int, int]]:
     name, equals, size = text.partition("=")
     if not equals or not name:
         raise argparse.ArgumentTypeError(f"must read NAME=WIDTHxHEIGHT, say evt=640x480, not {text!r}")
     return name, picture_size(size)
-
-
-def _named_file(text: str) -> tuple[str, str]:
-    name, equals, file = text.partition("=")
-    if not equals or not name or not file:
-        raise argparse.ArgumentTypeError(f"must read NAME=FILE, say evt=camera.yaml, not {text!r}")
-    return name, file

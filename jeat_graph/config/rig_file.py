@@ -28,6 +28,7 @@ import yaml
 from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.picture_map import PictureMap
 
 #: Words for ways that need no numbers.
 NONE, SCALE = "none", "scale"
@@ -35,6 +36,8 @@ _TOP = ("image", "sensors")
 _CLOCK = tuple(one.name for one in dataclasses.fields(ClockConfig))
 _SENSOR = ("image", "to_picture", "covariance", *_CLOCK)
 _SHAPES = ((3, 3), (3, 4))
+# Digits of what is written: boxes are good to a hundredth of a pixel, clocks to a microsecond.
+_DIGITS, _TIME_PLACES, _DRIFT_PLACES = 9, 6, 3
 
 
 def read_rig(path: str | Path) -> dict[str, Any]:
@@ -75,6 +78,36 @@ def rig_text(image: tuple[int, int], sensors: Mapping[str, Mapping[str, Any]], n
     tree = {"image": list(image), "sensors": {name: dict(one) for name, one in sensors.items()}}
     head = "".join(f"# {line}\n" for line in notes)
     return head + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None, width=110)
+
+
+def sensor_entry(way: PictureMap, clock: ClockConfig | None, size: tuple[int, int]) -> dict[str, Any]:
+    """Return what a rig says of a sensor.
+
+    Args:
+        way: from its picture to the common one.
+        clock: None where its times are the common ones, or nothing is known of it.
+        size: width and height of its picture (px).
+    """
+    columns = 4 if way.parallax else 3
+    kept = [k for k in range(11) if columns == 4 or k not in (3, 7, 10)]
+    out: dict[str, Any] = {
+        "image": list(size),
+        "to_picture": [[_short(v) for v in row[:columns]] for row in way.matrix],
+        "covariance": [[_short(v) for v in row] for row in way.covariance[kept][:, kept]],
+    }
+    if clock is not None:
+        out |= {
+            "offset_s": round(clock.offset_s, _TIME_PLACES),
+            "offset_std_s": round(clock.offset_std_s, _TIME_PLACES),
+            "drift_ppm": round(clock.drift_ppm, _DRIFT_PLACES),
+            "drift_std_ppm": round(clock.drift_std_ppm, _DRIFT_PLACES),
+            "at_s": round(clock.at_s, _TIME_PLACES),
+        }
+    return out
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.{_DIGITS}g}")
 
 
 def _sensor(one: Any, where: str, common: tuple[float, float] | None, file: Path) -> dict[str, Any]:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import warnings
 from collections.abc import Generator
 
+import numpy as np
+
 from jeat_graph.config.reading import as_config, load_config
+from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.in_steps import run_through, worth
 from jeat_graph.data.trajectories import Trajectories
@@ -14,6 +17,9 @@ from jeat_graph.runs.declaring import fit_input
 from jeat_graph.tracking.tracker import Tracker
 
 _SCANS_PER_DRAIN, _DRAINING_STEPS = 256, 8
+# The edge may cut boxes that end nearer to it than this share of their size: two standard deviations of usual
+# detectors.
+_MARGIN = 0.1
 
 
 def own_tracks(detections: Detections, size_px: tuple[float, float] | None = None) -> SensorTracks:
@@ -45,4 +51,13 @@ def own_tracks_in_steps(
     parts.append(tracker.finish())
     table = Trajectories.concatenate(parts)
     yield from worth(_DRAINING_STEPS)
-    return (yield from sensor_tracks_in_steps(table.t, table.track_id, table.boxes, detections))
+    whole = _whole(table.boxes, (config.image.width, config.image.height))
+    rows = table.t[whole], table.track_id[whole], table.boxes[whole]
+    return (yield from sensor_tracks_in_steps(*rows, detections))
+
+
+def _whole(boxes: FloatArray, size_px: tuple[float, float]) -> BoolArray:
+    """Which boxes (N, 4) the picture's edge does not cut: of others neither size nor centre is seen."""
+    margin = _MARGIN * boxes[:, 2:]
+    far = boxes[:, :2] + boxes[:, 2:]
+    return np.asarray((boxes[:, :2] > margin).all(axis=1) & (far < np.array(size_px) - margin).all(axis=1))

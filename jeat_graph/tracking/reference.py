@@ -225,7 +225,8 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     track, box = likelihood_ratio.assign(by_looks(ratio, scan.alike))
     seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track, box]
     nis = (seen[0].mean(axis=2) ** 2 / seen[1].mean(axis=(2, 3))).sum(axis=1)
-    by_itself = score_calibration.box_probability(scan.boxes, scan.logits, float(state.sensors.indifference[k]))
+    indifference = float(state.sensors.indifference[k])
+    by_itself = score_calibration.box_probability(scan.boxes, scan.logits, indifference)
     confirms = by_itself[box] >= c.confirming
     return AssociatedPairs(track, box, ratio[track, box], p_detect, confirms, innovation, nis)
 

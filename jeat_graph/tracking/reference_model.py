@@ -153,7 +153,8 @@ class ReferenceModel:
             tracks.track_id,
             (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
         )
-        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used, tracks.evidence.confirmed_s == t)
+        confirmed = tracks.evidence.confirmed_s == t
+        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used, confirmed)
 
     def record(self) -> Step:
         """Return what the last step gave the smoother."""

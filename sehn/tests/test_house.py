@@ -28,7 +28,9 @@ PUBLIC = {
     "jeat_graph.cli.terminal",
     "jeat_graph.config.argument_types",
     "jeat_graph.config.fields",
+    "jeat_graph.config.rig_file",
     "jeat_graph.config.section_tree",
+    "jeat_graph.config.sensors",
     "jeat_graph.config.yaml_text",
     "jeat_graph.data.arrays",
     "jeat_graph.data.detections",
@@ -71,6 +73,8 @@ PUBLIC = {
     "jeat_graph.io.tables.truth_io",
     "jeat_graph.io.media.video",
     "jeat_graph.io.media.video_writer",
+    "jeat_graph.road.camera",
+    "jeat_graph.road.camera_map",
     "jeat_graph.runs.demo_recording",
     "jeat_graph.version",
 }

@@ -27,14 +27,20 @@ OWN, COMMON = camera(0.8, 640, 480, 600.0), camera(0.0, 1280, 720, 1100.0)
 
 
 def boxes(one: RoadCamera) -> np.ndarray:
-    """Boxes (N, 4) around upright lines of cars and lorries."""
+    """Boxes (N, 4) around cars and lorries that drive along the road, corner by corner."""
     out = []
     for x in (-5.0, 0.0, 5.0):
-        for y in (20.0, 40.0, 90.0):
-            for height in (1.5, 3.5):
-                foot = np.array([x, y, 0.0])
-                (low, high), _ = one.project(np.stack([foot, foot + np.array([0.0, 0.0, height])]))
-                out.append([low[0] - 10, high[1], 20, low[1] - high[1]])
+        for y in (25.0, 40.0, 90.0):
+            for length, width, height in ((4.2, 1.8, 1.5), (12.0, 2.5, 3.5)):
+                corners = [
+                    (x + a * width / 2, y + b * length / 2, c * height)
+                    for a in (-1, 1)
+                    for b in (-1, 1)
+                    for c in (0, 1)
+                ]
+                pixels = np.array([one.project(np.array(corner))[0] for corner in corners])
+                low, high = pixels.min(axis=0), pixels.max(axis=0)
+                out.append([*low, *(high - low)])
     return np.array(out)
 
 
@@ -42,10 +48,11 @@ def test_boxes_go_where_the_other_camera_sees_them() -> None:
     way, left = map_between(OWN, COMMON)
     there, seen = way.boxes(boxes(OWN))
     assert seen.all()
-    assert left < 0.7
+    assert left < 1.5
     right = boxes(COMMON)
     centre = (there - right)[:, :2] + 0.5 * (there - right)[:, 2:]
-    assert np.abs(centre).max() < 1.2  # of a lorry at 20 m, 200 px tall
+    assert np.abs(centre[::2]).max() < 2.5  # cars
+    assert (np.abs(centre[1::2]).max(axis=1) / right[1::2, 3]).max() < 0.04  # lorries, 12 m long
     assert np.abs(there[:, 3] / right[:, 3] - 1.0).max() < 0.03
 
 

@@ -247,7 +247,7 @@ def test_a_vehicle_that_nobody_sees_for_two_seconds_keeps_its_identity_if_it_goe
 
 @pytest.mark.parametrize("overlaps", [True, False])
 def test_a_poor_box_upon_a_better_one_keeps_no_track_reported(overlaps):
-    """Two vehicles are seen well for 2 s; then one box is poor, and of use only where no better one covers it."""
+    """Two vehicles are seen well; then one has poor boxes, of use only where no better one covers them."""
     config = load_config("default", ["sensors.rgb.even_score=0.5"])
     made = Tracker(config, engine=ENGINE, image=IMAGE)
     told = []

@@ -14,8 +14,11 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.progress import refreshing
 
 if TYPE_CHECKING:
+    from jeat_graph_sehn.simulation.dataset.protocol import Protocol
     from jeat_graph_sehn.simulation.dataset.workers import SourceFactory
+    from jeat_graph_sehn.simulation.imaging.config import ImagingConfig
     from jeat_graph_sehn.simulation.scenario import Scenario
+    from jeat_graph_sehn.simulation.world.rig import RigConfig
 
 HELP = "simulate a highway seen by an RGB and an event camera: detections or pictures, and truth"
 _DENSITIES = ("sparse", "normal", "dense")
@@ -57,6 +60,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     only = parser.add_argument_group("with --sensors detections")
     only.add_argument("--duration", type=float, metavar="S", help=f"length (default {_DURATION_S:g})")
+    parser.add_argument(
+        "--rig",
+        metavar="drawn|FILE",
+        help="the event camera gets a place, lens, picture and clock of its own: drawn from the seed, or as "
+        "a YAML file says, such as {right_m: 0.3, width: 640, height: 480, focal_px: 550, offset_s: 2.5}; "
+        "the true rig.yaml is written beside (with --sensors pictures two sets and rigs/000000.yaml, …)",
+    )
     pictures = parser.add_argument_group(
         "with --sensors pictures or carla",
         "A run that was stopped goes on where it was when it is called again, and gives the same bytes.",
@@ -124,6 +134,7 @@ def run(args: argparse.Namespace) -> int:
     if args.scenario is None or args.out is None:
         raise ConfigError("SCENARIO and --out DIR are needed (or --verify DIR)")
     unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration",))]
+    unfit += [] if args.sensors in ("detections", "pictures") else ["rig"]
     unfit += [] if args.sensors == "carla" else _CARLA_ONLY
     unfit += ["imaging", "workers", "world", "event_camera", "masks"] if args.sensors == "carla" else []
     for name in unfit:
@@ -146,7 +157,7 @@ def _detections(args: argparse.Namespace, scenario: Scenario) -> int:
     duration = _DURATION_S if args.duration is None else args.duration
     with tqdm(total=STEPS, desc="simulate", disable=not sys.stderr.isatty(), leave=False) as bar:
         manifest = write_detection_set(
-            scenario, str(args.scenario), Path(args.out), args.seed, duration, bar.update
+            scenario, str(args.scenario), Path(args.out), args.seed, duration, bar.update, _rig(args.rig)
         )
     for name, count in manifest["sensors"].items():
         print(f"{name}: {count['detections']} boxes in {count['scans']} scans")
@@ -156,13 +167,7 @@ def _detections(args: argparse.Namespace, scenario: Scenario) -> int:
 
 
 def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
-    from tqdm import tqdm
-
-    from jeat_graph.data.processes import available_cores
-    from jeat_graph_sehn.simulation.compiling import prepare_renderer
     from jeat_graph_sehn.simulation.dataset.protocol import Protocol
-    from jeat_graph_sehn.simulation.dataset.recording import record_dataset
-    from jeat_graph_sehn.simulation.scenario import scenario_to_yaml
 
     given = {
         "video": args.video or ("png" if args.world == "varied" else None),
@@ -175,8 +180,55 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
         **{key: value for key, value in given.items() if value is not None},
     )
     frames = args.frames or _FRAMES
+    if args.rig is not None:
+        return _rig_pictures(args, scenario, protocol, frames)
     carla = args.sensors == "carla"
     factory = _carla_source(args, scenario, frames) if carla else _renderer(args, scenario, frames)
+    return _record(args, scenario, protocol, frames, factory, Path(args.out))
+
+
+def _rig_pictures(args: argparse.Namespace, scenario: Scenario, protocol: Protocol, frames: int) -> int:
+    """Render a rig: a set of each camera, and the true rig of each segment."""
+    from jeat_graph.io.files.atomic import open_atomic
+    from jeat_graph_sehn.simulation.dataset.layout import RIGS, segment_name
+    from jeat_graph_sehn.simulation.imaging.rig_source import RigEventSource
+
+    rig = _rig(args.rig)
+    assert rig is not None
+    imaging, world = _imaging(args), args.world or "fixed"
+    second = partial(RigEventSource, scenario, imaging, args.seed, frames, world, rig)
+    source = second()
+    texts = [source.rig_text(index) for index in range(protocol.segments)]  # refused before anything is made
+    _record(
+        args, scenario, protocol, frames, _renderer(args, scenario, frames, "rgb"), Path(args.out) / "rgb"
+    )
+    _record(args, scenario, protocol, frames, second, Path(args.out) / "evt")
+    folder = Path(args.out) / RIGS
+    folder.mkdir(exist_ok=True)
+    for index, text in enumerate(texts):
+        with open_atomic(folder / f"{segment_name(index)}.yaml") as file:
+            file.write(text)
+    print(f"wrote {folder}")
+    return 0
+
+
+def _record(
+    args: argparse.Namespace,
+    scenario: Scenario,
+    protocol: Protocol,
+    frames: int,
+    factory: SourceFactory,
+    out: Path,
+) -> int:
+    """Make a set of pictures, and print what is in it."""
+    from tqdm import tqdm
+
+    from jeat_graph.data.processes import available_cores
+    from jeat_graph_sehn.simulation.compiling import prepare_renderer
+    from jeat_graph_sehn.simulation.dataset.recording import record_dataset
+    from jeat_graph_sehn.simulation.scenario import scenario_to_yaml
+
+    carla = args.sensors == "carla"
     # One server renders for CARLA, so there is nothing to gain from several processes.
     workers = 1 if carla else min(args.workers or available_cores(), protocol.segments)
     total = protocol.segments * frames
@@ -189,7 +241,7 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     ):
         manifest = record_dataset(
             factory,
-            args.out,
+            out,
             protocol,
             scenario_yaml=scenario_to_yaml(scenario),
             workers=workers,
@@ -204,13 +256,12 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     print(
         f"contrast-to-noise below 2 in the RGB pictures: {100 * totals['faint'] / asked:.1f} % of the others"
     )
-    print(f"wrote {args.out}")
+    print(f"wrote {out}")
     return 0
 
 
-def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> SourceFactory:
+def _imaging(args: argparse.Namespace) -> ImagingConfig:
     from jeat_graph_sehn.simulation.imaging.config import load_imaging
-    from jeat_graph_sehn.simulation.imaging.source import RenderedSource
 
     tree: dict[str, Any] = {} if args.imaging is None else _read_yaml(Path(args.imaging))
     if args.size is not None or "width" not in (tree.get("render") or {}):
@@ -218,15 +269,22 @@ def _renderer(args: argparse.Namespace, scenario: Scenario, frames: int) -> Sour
         tree["render"] = {**(tree.get("render") or {}), "width": width, "height": height}
     if args.event_camera is not None:
         tree["evt"] = {**(tree.get("evt") or {}), "sensor": args.event_camera}
-    world = args.world or "fixed"
+    return load_imaging(tree)
+
+
+def _renderer(
+    args: argparse.Namespace, scenario: Scenario, frames: int, sensors: str | None = None
+) -> SourceFactory:
+    from jeat_graph_sehn.simulation.imaging.source import RenderedSource
+
     return partial(
         RenderedSource,
         scenario,
-        load_imaging(tree),
+        _imaging(args),
         args.seed,
         frames,
-        world,
-        args.sensors,
+        args.world or "fixed",
+        sensors or args.sensors,
         masks=bool(args.masks),
     )
 
@@ -241,6 +299,17 @@ def _carla_source(args: argparse.Namespace, scenario: Scenario, frames: int) -> 
     config = CarlaConfig(width=width, height=height)
     host, port = args.carla_host or "localhost", args.carla_port or 2000
     return partial(CarlaSource, scenario, config, args.seed, frames, host, port)
+
+
+def _rig(given: str | None) -> RigConfig | str | None:
+    """Settings of the second camera: none, to be drawn, or those of a file."""
+    from jeat_graph.config.section_tree import build
+    from jeat_graph_sehn.simulation.world.rig import DRAWN, RigConfig
+
+    if given is None or given == DRAWN:
+        return given
+    found: RigConfig = build(RigConfig, _read_yaml(Path(given)), "")
+    return found
 
 
 def _verify(folder: Path) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io.files.atomic import open_atomic
 from jeat_graph.io.files.hashing import sha256_of
 from jeat_graph.io.files.locking import hold_folder
@@ -22,18 +24,28 @@ from jeat_graph_sehn.simulation.dataset.layout import (
     CAMERA,
     DETECTIONS,
     MANIFEST,
+    RIG,
+    RIG_CAMERA,
+    RIG_TRUTH,
     SCENARIO,
     TRUTH,
     TRUTH_ROAD,
 )
 from jeat_graph_sehn.simulation.scenario import Scenario, scenario_to_yaml
-from jeat_graph_sehn.simulation.simulate import SimulatedRecording, record
+from jeat_graph_sehn.simulation.simulate import RIG_SENSOR, SimulatedRecording, record
+from jeat_graph_sehn.simulation.world.rig import Rig, RigConfig
 
 STEPS = 3  # calls of `on_step`
 
 
 def write_detection_set(
-    scenario: Scenario, name: str, out: Path, seed: int, duration_s: float, on_step: Callable[[], object]
+    scenario: Scenario,
+    name: str,
+    out: Path,
+    seed: int,
+    duration_s: float,
+    on_step: Callable[[], object],
+    rig: RigConfig | str | None = None,
 ) -> dict[str, Any]:
     """Simulate a recording and write detections, truth in the picture and on the road, settings, manifest.
 
@@ -44,23 +56,35 @@ def write_detection_set(
         seed: not negative.
         duration_s: length (s).
         on_step: called three times on the way.
+        rig: the second camera (see `record`); the true rig, its pose and its own truth are then written too.
 
     Returns:
         The manifest.
 
     Raises:
-        ConfigError: a seed or a duration that is not valid.
-        DataError: another process is writing into the folder.
+        ConfigError: a seed, a duration or a rig that is not valid.
+        DataError: another process is writing into the folder, or the two cameras see different roads.
     """
-    recording = record(scenario, seed, duration_s)
+    recording = record(scenario, seed, duration_s, rig)
+    true_rig = None
+    if recording.rig is not None:
+        true_rig = recording.rig.text((scenario.truth_sensor, RIG_SENSOR))
     on_step()
     out.mkdir(parents=True, exist_ok=True)
     with hold_folder(out):
-        return _write(recording, name, out, {"seed": seed, "duration_s": duration_s}, on_step)
+        asked: dict[str, Any] = {"seed": seed, "duration_s": duration_s}
+        if recording.rig is not None:
+            asked["rig"] = dataclasses.asdict(recording.rig.config)
+        return _write(recording, name, out, asked, on_step, true_rig)
 
 
 def _write(
-    recording: SimulatedRecording, name: str, out: Path, asked: dict[str, Any], on_step: Callable[[], object]
+    recording: SimulatedRecording,
+    name: str,
+    out: Path,
+    asked: dict[str, Any],
+    on_step: Callable[[], object],
+    true_rig: str | None,
 ) -> dict[str, Any]:
     detections, truth, scenario = recording.detections, recording.truth, recording.scenario
     write_detections(detections, out / DETECTIONS)
@@ -72,6 +96,12 @@ def _write(
         file.write(scenario_to_yaml(scenario))
     with open_atomic(out / CAMERA) as file:
         file.write(yaml.safe_dump(recording.scene.camera.to_dict(), sort_keys=False))
+    files = [DETECTIONS, TRUTH, TRUTH_ROAD, SCENARIO, CAMERA]
+    for file_name in (RIG, RIG_CAMERA, RIG_TRUTH):
+        (out / file_name).unlink(missing_ok=True)  # of an earlier recording
+    if recording.rig is not None and recording.own_truth is not None and true_rig is not None:
+        _write_rig(recording.rig, recording.own_truth, true_rig, out)
+        files += [RIG, RIG_CAMERA, RIG_TRUTH]
     boxes = np.diff(detections.scan_start)
     sensors = {
         sensor: {
@@ -92,11 +122,19 @@ def _write(
             "ignored": int(truth.ignore.sum()),
             "objects": len(np.unique(truth.object_id)),
         },
-        "sha256": {file: sha256_of(out / file) for file in (DETECTIONS, TRUTH, TRUTH_ROAD, SCENARIO, CAMERA)},
+        "sha256": {name: sha256_of(out / name) for name in files},
     }
     with open_atomic(out / MANIFEST) as file:
         file.write(json.dumps(manifest, indent=2) + "\n")
     return manifest
+
+
+def _write_rig(rig: Rig, own_truth: GroundTruth, text: str, out: Path) -> None:
+    with open_atomic(out / RIG) as file:
+        file.write(text)
+    with open_atomic(out / RIG_CAMERA) as file:
+        file.write(yaml.safe_dump(rig.own.to_dict(), sort_keys=False))
+    write_truth(own_truth, out / RIG_TRUTH)
 
 
 def road_truth(recording: SimulatedRecording) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph.io.files.hashing import sha256_of
 from jeat_graph.io.media.video import FRAME_TIMES, VIDEO_FILES, open_frames, read_frame_times
@@ -23,6 +24,9 @@ from jeat_graph_sehn.simulation.dataset.layout import (
     EVENTS,
     FORMAT,
     MANIFEST,
+    RIG,
+    RIG_CAMERA,
+    RIG_TRUTH,
     SEGMENT_JSON,
     SEGMENTS,
     TRUTH,
@@ -185,13 +189,33 @@ def _outside(path: Path, boxes: FloatArray, size: tuple[int, int]) -> Iterator[s
         yield f"{path}: {int(out.sum())} boxes reach beyond the picture of {size[0]} x {size[1]} px"
 
 
-def _check_detections(root: Path, manifest: dict[str, Any]) -> Iterator[str]:
+def _size_of(path: Path) -> tuple[int, int] | None:
+    """Width and height of a camera's picture, None where its file does not tell them."""
     import yaml
 
     try:
-        camera = load_yaml((root / CAMERA).read_text(encoding="utf-8"))
-        size = int(camera["width"]), int(camera["height"])
+        camera = load_yaml(path.read_text(encoding="utf-8"))
+        return int(camera["width"]), int(camera["height"])
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError):
+        return None
+
+
+def _check_rig(root: Path, truth: GroundTruth) -> Iterator[str]:
+    """The second camera's truth lies in its picture, and is of the moments of the first's."""
+    size = _size_of(root / RIG_CAMERA)
+    if size is None:
+        yield f"{root / RIG_CAMERA}: has no width and height"
+        return
+    own = read_truth(root / RIG_TRUTH)
+    yield from _outside(root / RIG_TRUTH, own.boxes, size)
+    ours, theirs = len(truth.frame_times()), len(own.frame_times())
+    if ours != theirs:
+        yield f"{root / RIG_TRUTH}: {theirs} frames, but {TRUTH} has {ours}"
+
+
+def _check_detections(root: Path, manifest: dict[str, Any]) -> Iterator[str]:
+    size = _size_of(root / CAMERA)
+    if size is None:
         yield f"{root / CAMERA}: has no width and height"
         return
     truth = read_truth(root / TRUTH)
@@ -199,6 +223,8 @@ def _check_detections(root: Path, manifest: dict[str, Any]) -> Iterator[str]:
     counts = manifest.get("truth", {})
     if (len(truth), len(truth.frame_times())) != (counts.get("boxes"), counts.get("frames")):
         yield f"{root / TRUTH}: {len(truth)} boxes in {len(truth.frame_times())} frames, not as in {MANIFEST}"
+    if (root / RIG).exists():
+        yield from _check_rig(root, truth)
     detections = read_detections(root / DETECTIONS)
     for k, name in enumerate(detections.sensors):
         mine = detections.scan_sensor == k

@@ -33,7 +33,7 @@ from jeat_graph_sehn.simulation.streams import stream
 from jeat_graph_sehn.simulation.variety import vary
 from jeat_graph_sehn.simulation.world.camera import Camera
 from jeat_graph_sehn.simulation.world.scene import Scene
-from jeat_graph_sehn.simulation.world.surroundings import FIXED
+from jeat_graph_sehn.simulation.world.surroundings import FIXED, Surroundings
 
 # Settings that came after the first recordings: they are stated where they are not as they were then.
 _LATER = (
@@ -129,7 +129,8 @@ class RenderedSource:
         """Build the scene of segment `index`, with traffic of its own, and a world where they vary."""
         return self._build(index)[0]
 
-    def _build(self, index: int) -> tuple[Scene, ImagingConfig, Scenario]:
+    def _world(self, index: int) -> tuple[Scenario, ImagingConfig, Surroundings]:
+        """Settings of segment `index`: drawn where worlds vary."""
         s, imaging, around = self.scenario, self.imaging, FIXED
         if self.world == "varied":
             # Each light has worlds and traffic of its own, so that a net cannot learn one from the other.
@@ -138,11 +139,20 @@ class RenderedSource:
             rng = stream(self.seed, f"segment.{index}.lens.{light}")
             imaging = replace(imaging, lens=vary_lens(rng, imaging.lens, s.camera))
             imaging = replace(imaging, render=vary_insects(rng, vary_wet(rng, imaging.render)))
+        return s, imaging, around
+
+    def _camera_of(self, index: int) -> Camera:
+        """The camera through which segment `index` is seen."""
+        s, imaging, _ = self._world(index)
+        return Camera.mounted(scaled_camera(s.camera, imaging.render.width, imaging.render.height))
+
+    def _build(self, index: int) -> tuple[Scene, ImagingConfig, Scenario]:
+        s, imaging, around = self._world(index)
         seed = self._segment_seed(index)
         duration = (self.frames + _BEFORE) / imaging.rgb.rate_hz + 1.0
         camera = scaled_camera(s.camera, imaging.render.width, imaging.render.height)
         scene = Scene.build(seed, duration, s.road, s.fleet, s.traffic, s.light, camera)
-        return replace(scene, around=around), imaging, s
+        return replace(scene, around=around, camera=self._camera_of(index)), imaging, s
 
     def frame_times_us(self, index: int) -> IntArray:
         """Times of the frames of a segment (µs): nominal ones with jitter, the first after two periods."""

@@ -63,15 +63,7 @@ class Camera:
     @staticmethod
     def mounted(config: CameraConfig) -> Camera:
         """Mount a camera on the gantry as configured."""
-        pitch, yaw = math.radians(config.pitch_deg), math.radians(config.yaw_deg)
-        ahead = np.array([math.sin(yaw), math.cos(yaw), 0.0])
-        right = np.array([math.cos(yaw), -math.sin(yaw), 0.0])
-        up = np.array([0.0, 0.0, 1.0])
-        forward = math.cos(pitch) * ahead - math.sin(pitch) * up
-        down = -math.sin(pitch) * ahead - math.cos(pitch) * up
-        if config.roll_deg:
-            cos, sin = math.cos(math.radians(config.roll_deg)), math.sin(math.radians(config.roll_deg))
-            right, down = cos * right + sin * down, cos * down - sin * right
+        rotation = turned(config.pitch_deg, config.yaw_deg, config.roll_deg)
         return Camera(
             width=config.width,
             height=config.height,
@@ -80,7 +72,7 @@ class Camera:
             cx=config.cx,
             cy=config.cy,
             position=np.array([config.offset_m, 0.0, config.mount_height_m]),
-            rotation=np.stack([right, down, forward]),
+            rotation=rotation,
         )
 
     def to_camera(self, points: FloatArray) -> FloatArray:
@@ -152,3 +144,17 @@ class Camera:
             "rotation_world_to_camera": [[float(v) for v in row] for row in self.rotation],
             "axes": "world x right, y along the road, z up; camera X right, Y down, Z forward",
         }
+
+
+def turned(pitch_deg: float, yaw_deg: float, roll_deg: float) -> FloatArray:
+    """Rotation (3, 3) from the world to a camera tilted down, turned right and rolled clockwise (deg)."""
+    pitch, yaw = math.radians(pitch_deg), math.radians(yaw_deg)
+    ahead = np.array([math.sin(yaw), math.cos(yaw), 0.0])
+    right = np.array([math.cos(yaw), -math.sin(yaw), 0.0])
+    up = np.array([0.0, 0.0, 1.0])
+    forward = math.cos(pitch) * ahead - math.sin(pitch) * up
+    down = -math.sin(pitch) * ahead - math.cos(pitch) * up
+    if roll_deg:
+        cos, sin = math.cos(math.radians(roll_deg)), math.sin(math.radians(roll_deg))
+        right, down = cos * right + sin * down, cos * down - sin * right
+    return np.stack([right, down, forward])
