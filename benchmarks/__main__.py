@@ -27,6 +27,8 @@ _KINDS = {
     "mevdt": (_TABLES, "trackers on MEVDT: vehicles seen by a DAVIS camera"),
     "etram": (_TABLES, "trackers on eTraM: traffic seen by an event camera"),
     "dsec-det": (_TABLES, "trackers on DSEC-Det: events and frames of a driving car"),
+    "dsec-mot": (_TABLES, "trackers on DSEC-MOT: events of a driving car"),
+    "tumtraf": (_TABLES, "trackers on TUMTraf: cameras over a road, boxes in OpenLABEL"),
     "real": (_TABLES, "trackers on all recordings of a folder"),
     "simulated": (_TABLES, "trackers on simulated highways, streets, squares, and with odd detectors"),
     "detection": ("benchmarks.detection", "how well detectors find vehicles in raw pictures and raw events"),
