@@ -47,7 +47,10 @@ _KINDS = {
         "benchmarks.rigs",
         "pictures and clocks of two cameras brought together by the traffic they saw",
     ),
-    "events": ("benchmarks.events", "noise of the event cameras, what reduces it, and what vehicles give"),
+    "events": (
+        "benchmarks.events",
+        "decoding beside other packages, noise of the event cameras, and what vehicles give",
+    ),
 }
 
 

@@ -15,7 +15,7 @@ from jeat_graph.config.reading import config_to_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.version import __version__
 
-_PACKAGES = ("numpy", "scipy", "gtsam", "trackers", "norfair", "supervision")
+_PACKAGES = ("numpy", "scipy", "gtsam", "trackers", "norfair", "supervision", "evt3", "evlib")
 _ROOT = Path(__file__).resolve().parents[1]
 #: Folders that a benchmark imports from.
 _IMPORTED = ("jeat_graph", "filters", "association", "smoothers", "eval", "configs", "benchmarks", "sehn")
