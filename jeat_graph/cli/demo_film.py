@@ -14,9 +14,9 @@ from jeat_graph.cli.demo_raw import NETWORK, in_order
 
 SCENARIO, SEED, FRAMES, SIZE = "night-nolight-stop", 31, 400, "640x384"
 #: Where vehicles of each direction are counted (px).
-LINES = ("towards=20,215,300,215", "away=335,215,620,215")
-#: Both vehicles stand then (s).
-STILL_AT_S = 17.0
+LINES = ("towards=5,232,285,232", "away=340,232,635,232")
+#: The lorry stands then, and the next vehicle comes to a stop behind it (s).
+STILL_AT_S = 15.6
 #: Of the film of a user's own recordings: moments of the picture beside it.
 _MOMENTS = 2
 
