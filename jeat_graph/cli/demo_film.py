@@ -15,6 +15,8 @@ from jeat_graph.cli.demo_raw import NETWORK, in_order
 SCENARIO, SEED, FRAMES, SIZE = "night-nolight-stop", 31, 400, "640x384"
 #: Where vehicles of each direction are counted (px).
 LINES = ("towards=5,232,285,232", "away=340,232,635,232")
+#: So long are events shown (s): at this light, in the time of a picture, noise would hide the vehicles.
+WINDOW_S = 0.01
 #: The lorry stands then, and the next vehicle comes to a stop behind it (s).
 STILL_AT_S = 15.6
 #: Of the film of a user's own recordings: moments of the picture beside it.
@@ -29,7 +31,7 @@ def simulated_commands(out: Path, config: str) -> list[list[str]]:
     network = ["--detector-frames", NETWORK, "--detector-events", NETWORK]
     network += ["--detection-set", "events.rate_hz=20"]  # a scan a picture, in two fifths of the time
     run = str(out / "film-run")
-    drawn = ["render", run, *raw, *_marked(LINES, ())]
+    drawn = ["render", run, *raw, *_marked(LINES, ()), "--window", f"{WINDOW_S:g}"]
     return [
         ["simulate", SCENARIO, *clip, "--out", str(out / "film-clip")],
         ["track", *raw, *network, "--config", config, "--out", run],
