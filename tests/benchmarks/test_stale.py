@@ -161,3 +161,15 @@ def test_every_page_of_the_documentation_names_its_commit():
         for entry in entries_of(page):
             assert entry.commit is not None, f"{entry.page}: {entry.table or 'the page'} names no commit"
             assert entry.kind in KINDS or entry.kind in stale._COMMANDS
+
+
+def test_rigs_say_how_they_were_made_and_can_be_read_again(tmp_path, monkeypatch, capsys):
+    refused = {"refused": "no traffic", "seconds": 1.0}
+    monkeypatch.setattr(
+        "benchmarks.rigs.measure_rig", lambda kind, seed: {"kind": kind, "seed": seed, **refused}
+    )
+    assert main(["rigs", "--quick", "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    assert "Made by `python -m benchmarks rigs --quick` at commit `" in (tmp_path / "rigs.md").read_text()
+    assert main(["rigs", "--from", str(tmp_path / "rigs.json")]) == 0
+    assert capsys.readouterr().out == shown
