@@ -58,7 +58,7 @@ def read_dsec_mot(path: Path) -> GroundTruth:
         row = int(np.setdiff1d(np.arange(len(t_us)), first)[0])
         raise table.error(row, f"track {identity[row]} is there twice at {t_us[row]} µs")
     return GroundTruth(
-        t=1e-6 * t_us,
+        t=np.asarray(1e-6 * t_us, dtype=np.float64),
         object_id=identity,
         boxes=boxes,
         motion=None,
