@@ -31,13 +31,11 @@ def simulated_commands(out: Path, config: str) -> list[list[str]]:
     network = ["--detector-frames", NETWORK, "--detector-events", NETWORK]
     network += ["--detection-set", "events.rate_hz=20"]  # a scan a picture, in two fifths of the time
     run = str(out / "film-run")
-    # Each second picture, for writing films takes long.
     drawn = ["render", run, *raw, *_marked(LINES, ()), "--window", f"{WINDOW_S:g}"]
-    film = [*drawn, "--output-rate", "10", "--out", str(out / "film.mp4")]
     return [
         ["simulate", SCENARIO, *clip, "--out", str(out / "film-clip")],
         ["track", *raw, *network, "--config", config, "--out", run],
-        film,
+        [*drawn, "--out", str(out / "film.mp4")],
         [*drawn, "--at", f"{STILL_AT_S:g}", "--out", str(out / "film.png")],
     ]
 
