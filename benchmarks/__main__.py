@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -18,7 +19,7 @@ WRITES = ("checkpoint",)
 HELP = "Judge trackers on published data sets, and measure speed, detection, the road and more."
 _TABLES = "benchmarks.tables"
 #: By kind: the module that does it, and what it is.
-_KINDS = {
+KINDS = {
     "mot": (
         _TABLES,
         "trackers on folders in MOTChallenge's layout (MOT15 to MOT20, DanceTrack, SportsMOT, FEMOT) or ours",
@@ -27,6 +28,8 @@ _KINDS = {
     "mevdt": (_TABLES, "trackers on MEVDT: vehicles seen by a DAVIS camera"),
     "etram": (_TABLES, "trackers on eTraM: traffic seen by an event camera"),
     "dsec-det": (_TABLES, "trackers on DSEC-Det: events and frames of a driving car"),
+    "dsec-mot": (_TABLES, "trackers on DSEC-MOT: events of a driving car"),
+    "tumtraf": (_TABLES, "trackers on TUMTraf: cameras over a road, boxes in OpenLABEL"),
     "real": (_TABLES, "trackers on all recordings of a folder"),
     "simulated": (_TABLES, "trackers on simulated highways, streets, squares, and with odd detectors"),
     "detection": ("benchmarks.detection", "how well detectors find vehicles in raw pictures and raw events"),
@@ -45,7 +48,11 @@ _KINDS = {
         "benchmarks.rigs",
         "pictures and clocks of two cameras brought together by the traffic they saw",
     ),
-    "events": ("benchmarks.events", "noise of the event cameras, what reduces it, and what vehicles give"),
+    "stale": ("benchmarks.stale", "which tables were made by code that has changed since"),
+    "events": (
+        "benchmarks.events",
+        "decoding beside other packages, noise of the event cameras, and what vehicles give",
+    ),
 }
 
 
@@ -62,24 +69,39 @@ class _LateParser(Parser):
         return super().parse_known_args(*args, **kwargs)
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Build the parser of all benchmarks."""
+#: Options that say where a result is read or written, and not what it is.
+_PLACES = ("--out", "--readme", "--page", "--from", "--jobs")
+
+
+def build_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:
+    """Build the parser of all benchmarks; `words` are the command line that results will name."""
     parser = Parser(prog="python -m benchmarks", description=HELP)
     kinds = parser.add_subparsers(
-        dest="kind", metavar="|".join(_KINDS), required=True, parser_class=_LateParser
+        dest="kind", metavar="|".join(KINDS), required=True, parser_class=_LateParser
     )
-    for name, (module, text) in _KINDS.items():
+    for name, (module, text) in KINDS.items():
         sub = kinds.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
         sub.module_name = module
-    parser.set_defaults(command="benchmarks", run=run)
+    parser.set_defaults(command="benchmarks", run=run, words=_command(words))
     return parser
+
+
+def _command(words: Sequence[str]) -> str:
+    """Return a command line without what says where its result is written."""
+    kept: list[str] = []
+    passed = False
+    for word in words:
+        if not passed and word.partition("=")[0] not in _PLACES:
+            kept.append(word)
+        passed = word in _PLACES
+    return shlex.join(["python", "-m", "benchmarks", *kept])
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the benchmark that was asked for."""
     if getattr(args, "quick", False) and getattr(args, "readme", None):
         raise ConfigError("--quick is to see that it runs: leave out --readme, which holds full ones")
-    module = import_module(_KINDS[args.kind][0])
+    module = import_module(KINDS[args.kind][0])
     return int(module.run(args) or 0)
 
 
@@ -87,7 +109,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one benchmark; exit codes are those of `jeat-graph`."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
-        return carry_out("benchmarks", lambda: build_parser().parse_args(arguments))
+        return carry_out("benchmarks", lambda: build_parser(arguments).parse_args(arguments))
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "jeat_graph_sehn":
             raise

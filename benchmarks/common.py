@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.provenance import made_by
 from benchmarks.readme import update_readme
 from jeat_graph.config.argument_types import counting, natural, positive
 from jeat_graph.data.errors import DataError
@@ -80,7 +81,9 @@ def publish(
     from jeat_graph.io.files.atomic import open_atomic
 
     sys.stdout.write("\n".join(table.render("text") for table in tables.values()))
-    markdown = {key: table.render("markdown") for key, table in tables.items()}
+    result = {**result, "command": result.get("command") or args.words}
+    origin = made_by(result)
+    markdown = {key: f"{table.render('markdown').strip()}\n\n{origin}\n" for key, table in tables.items()}
     if args.out and not args.source:
         folder = Path(args.out)
         with open_atomic(folder / f"{name}.json") as file:

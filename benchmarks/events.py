@@ -1,4 +1,4 @@
-"""`python -m benchmarks events`: noise of the event cameras, what tames it, and what vehicles give."""
+"""`python -m benchmarks events`: decoding beside others, noise of the event cameras, what vehicles give."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks import common
 from benchmarks.event_noise import BASELINE, measure_noise
 from benchmarks.event_rates import SPEEDS, measure_rates
+from benchmarks.event_throughput import HISTOGRAM, OURS, PEERS, SURFACE, measure_throughput
 from benchmarks.judging import in_processes
 from benchmarks.provenance import provenance
 from jeat_graph.config.argument_types import counting, drawn_size, positive
@@ -22,6 +23,15 @@ if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
 _SCENARIOS = ("day", "night", "night-nolight")
+_THROUGHPUT, _NOISE, _MOTION = PARTS = ("throughput", "noise", "motion")
+_REPEATS = 7
+_TASKS = {
+    "evt3": "decode EVT3",
+    "evt2": "decode EVT2",
+    "dat": "decode DAT",
+    HISTOGRAM: "histograms of 5 ms by polarity",
+    SURFACE: "time surfaces, one each 50 ms",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,6 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.set_defaults(seeds=[0], scenarios=_SCENARIOS)
     add = parser.add_argument
+    add("--parts", nargs="+", choices=PARTS, default=PARTS, help="tables to make (all)", metavar="PART")
+    add("--stream", type=counting, default=2_000_000, metavar="N", help="events that are decoded (2000000)")
     add("--frames", type=counting, default=30, metavar="N", help="of each segment, 20 a second (30)")
     add("--size", type=drawn_size, default=(640, 384), metavar="WxH", help="picture (640x384)")
     add("--tick", type=positive, default=100.0, metavar="HZ", help="rate of CARLA's ticks (100)")
@@ -43,11 +55,12 @@ def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
     if args.quick:
         args.scenarios, args.seeds, args.frames, args.size = _SCENARIOS[1:2], args.seeds[:1], 6, (160, 96)
+        args.stream = min(args.stream, 100_000)
     return common.measure_or_read(args, "events", measure, tables)
 
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:
-    """Look at every segment with both cameras."""
+    """Decode a stream, and look at every segment with both cameras."""
     imaging = load_imaging(
         {
             "render": {"width": args.size[0], "height": args.size[1]},
@@ -56,25 +69,52 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     )
     ticks = max(2, round(args.frames * args.tick / imaging.rgb.rate_hz))
     pairs = [(name, seed) for name in args.scenarios for seed in args.seeds]
-    noise = in_processes(
-        measure_noise, [(name, seed, ticks, imaging) for name, seed in pairs], args.jobs, "CARLA's sensor"
-    )
-    rates = in_processes(
-        measure_rates, [(name, seed, args.frames, imaging) for name, seed in pairs], args.jobs, "event camera"
-    )
     settings = {"scenarios": list(args.scenarios), "seeds": list(args.seeds), "frames": args.frames}
-    return {
+    settings |= {"stream": args.stream, "size": list(args.size)}
+    result = {
         "benchmark": "events",
         **provenance(settings, {}),
         "imaging": plain(dataclasses.asdict(imaging)),
-        "noise": [record for part in noise for record in part],
-        "rates": rates,
     }
+    if _THROUGHPUT in args.parts:
+        result["throughput"] = measure_throughput(args.stream, args.size, args.seeds[0], _REPEATS)
+    if _NOISE in args.parts:
+        jobs = [(name, seed, ticks, imaging) for name, seed in pairs]
+        noise = in_processes(measure_noise, jobs, args.jobs, "CARLA's sensor")
+        result["noise"] = [record for part in noise for record in part]
+    if _MOTION in args.parts:
+        jobs = [(name, seed, args.frames, imaging) for name, seed in pairs]
+        result["rates"] = in_processes(measure_rates, jobs, args.jobs, "event camera")
+    return result
 
 
 def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     """Tables of a result, by the name of their markers."""
-    return {"events-noise": _noise_table(result), "events-speed": _speed_table(result)}
+    made = {
+        "events-throughput": ("throughput", _throughput_table),
+        "events-noise": ("noise", _noise_table),
+        "events-speed": ("rates", _speed_table),
+    }
+    return {name: table(result) for name, (part, table) in made.items() if part in result}
+
+
+def _throughput_table(result: Mapping[str, Any]) -> Table:
+    from jeat_graph.eval.tables import Table
+
+    found = {(r["task"], r["package"]): r for r in result["throughput"]}
+    columns = [OURS, *(package for package in (*PEERS, "NumPy"))]
+    records: list[dict[str, Cell]] = []
+    for task, text in _TASKS.items():
+        cells: dict[str, Cell] = {}
+        for package in columns:
+            one = found[task, package]
+            cells[package] = f"{one['mev_s']:.1f}" if one["mev_s"] is not None else one["why"]
+        records.append({"10⁶ events a second": text, **cells})
+    versions = ", ".join(
+        f"{name} {result['packages'][name]}" for name in PEERS if result["packages"].get(name)
+    )
+    title = f"Decoding and representations, one thread ({versions or 'no other package installed'})"
+    return Table.from_records(records, title=title)
 
 
 def _noise_table(result: Mapping[str, Any]) -> Table:

@@ -6,7 +6,8 @@ folder with one file a recording (`--detections`), in any format that `jeat-grap
 
 Sources of the layouts: MOTChallenge (Dendorfer et al., 2021) and, in the same layout, DanceTrack, SportsMOT
 and FEMOT; KITTI tracking (Geiger et al., 2012); MEVDT (El Shair and Rawashdeh, 2024); eTraM (Verma et al.,
-2024), boxes in Prophesee's arrays; DSEC-Det (Gehrig and Scaramuzza, 2024), boxes in Prophesee's arrays.
+2024), boxes in Prophesee's arrays; DSEC-Det (Gehrig and Scaramuzza, 2024), boxes in Prophesee's arrays;
+DSEC-MOT (Wang et al., SpikeMOT, arXiv:2309.16987, 2023); TUMTraf (Creß et al., 2024).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.recordings import JudgedRecording, RecordingSet
+from benchmarks.truth_files import is_dsec_mot, is_openlabel, read_dsec_mot, read_openlabel
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
@@ -49,6 +51,7 @@ class FoundRecording:
         rate_hz: frame rate, None where times are in the files.
         image: width and height (px), None where not known.
         forms: formats of truth and detections, None where the files show them.
+        reader: of the truth, where `jeat-graph` itself does not read its format.
     """
 
     group: str
@@ -58,6 +61,7 @@ class FoundRecording:
     rate_hz: float | None = None
     image: tuple[float, float] | None = None
     forms: tuple[str | None, str | None] = (None, None)
+    reader: Callable[[Path], GroundTruth] | None = None
 
 
 def mot(root: Path) -> Iterator[FoundRecording]:
@@ -130,12 +134,29 @@ def dsec(root: Path) -> Iterator[FoundRecording]:
         yield FoundRecording(group, name, truth, {}, None, _DSEC_IMAGE, ("prophesee", None))
 
 
+def dsec_mot(root: Path) -> Iterator[FoundRecording]:
+    """DSEC-MOT: a text file a sequence (`zurich_city_00_b.txt`) with seven numbers a line."""
+    for truth in filter(is_dsec_mot, sorted(root.rglob("*.txt"))):
+        group = f"DSEC-MOT {_group(root, truth.parent)}"
+        yield FoundRecording(group, truth.stem, truth, {}, None, _DSEC_IMAGE, reader=read_dsec_mot)
+
+
+def tumtraf(root: Path) -> Iterator[FoundRecording]:
+    """TUMTraf: folders of OpenLABEL files with boxes in the picture, one file a picture."""
+    for folder in sorted({path.parent for path in root.rglob("*.json")}):
+        if is_openlabel(folder):
+            group = f"TUMTraf {_group(root, folder)}"
+            yield FoundRecording(group, folder.name, folder, reader=read_openlabel)
+
+
 LAYOUTS: dict[str, Callable[[Path], Iterator[FoundRecording]]] = {
     "mot": mot,
     "kitti": kitti,
     "mevdt": mevdt,
     "etram": etram,
     "dsec-det": dsec,
+    "dsec-mot": dsec_mot,
+    "tumtraf": tumtraf,
 }
 
 
@@ -196,8 +217,10 @@ def _read(one: FoundRecording, how: LayoutOptions) -> JudgedRecording:
     if rate is None and "motchallenge" in one.forms:
         raise DataError("no seqinfo.ini beside it says its frame rate: give --rate HZ", one.truth)
     options: dict[str, Any] = {} if rate is None else {"rate_hz": rate}
-    contract = one.truth.suffix == ".csv"
-    truth = read_truth(one.truth, fmt=one.forms[0], **({} if contract else options))
+    if one.reader is not None:
+        truth = one.reader(one.truth)
+    else:
+        truth = read_truth(one.truth, fmt=one.forms[0], **({} if one.truth.suffix == ".csv" else options))
     if how.classes:
         truth = restrict_classes(truth, how.classes)
     parts: list[Detections] = []

@@ -39,6 +39,8 @@ PUBLISHED: tuple[tuple[Cell, ...], ...] = (
     ("FEMOTR", "FEMOT, test", 48.9, 52.0, 62.0, "Wang et al., FEMOT, arXiv:2606.14094, 2026"),
     ("McByte", "MOT17", 64.1, None, None, "documentation of `trackers` 2.6, 2026"),
     ("McByte", "DanceTrack", 67.2, None, None, "documentation of `trackers` 2.6, 2026"),
+    ("MCTrack, online", "KITTI cars, test", 80.8, 89.8, None, "Wang et al., arXiv:2409.16149, 2024"),
+    ("MCTrack, offline", "KITTI cars, test", 82.5, 91.5, None, "Wang et al., arXiv:2409.16149, 2024"),
 )
 _TITLES = {
     "mot": "Recordings in MOTChallenge's layout",
@@ -47,6 +49,8 @@ _TITLES = {
     "mevdt": "MEVDT",
     "etram": "eTraM",
     "dsec-det": "DSEC-Det",
+    "dsec-mot": "DSEC-MOT",
+    "tumtraf": "TUMTraf",
     "simulated": "Simulated recordings",
 }
 _HOW = """Scores are those of `jeat-graph eval`, pooled over the recordings of a set: MOTA and MOTP

@@ -15,7 +15,7 @@ from jeat_graph.config.reading import config_to_dict
 from jeat_graph.config.schema import Config
 from jeat_graph.version import __version__
 
-_PACKAGES = ("numpy", "scipy", "gtsam", "trackers", "norfair", "supervision")
+_PACKAGES = ("numpy", "scipy", "gtsam", "trackers", "norfair", "supervision", "evt3", "evlib")
 _ROOT = Path(__file__).resolve().parents[1]
 #: Folders that a benchmark imports from.
 _IMPORTED = ("jeat_graph", "filters", "association", "smoothers", "eval", "configs", "benchmarks", "sehn")
@@ -45,16 +45,25 @@ def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> di
 
 def commit() -> str:
     """The commit of this checkout as text; says so where files that are imported differ from it."""
-    git = shutil.which("git")
-    if git is None or not (_ROOT / ".git").exists():
+    head = git("rev-parse", "--short=12", "HEAD")
+    if not head:
         return "an unknown commit"
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", *_IMPORTED)
+    return f"commit `{head}`" + (" with changes" if changed else "")
 
-    def ask(*words: str) -> str:
-        done = subprocess.run([git, "-C", str(_ROOT), *words], capture_output=True, text=True, check=False)
-        return done.stdout.strip()
 
-    changed = ask("status", "--porcelain", "--untracked-files=no", "--", *_IMPORTED)
-    return f"commit `{ask('rev-parse', '--short=12', 'HEAD')}`" + (" with changes" if changed else "")
+def git(*words: str) -> str:
+    """Ask git about this checkout; empty where there is no answer."""
+    program = shutil.which("git")
+    if program is None or not (_ROOT / ".git").exists():
+        return ""
+    done = subprocess.run([program, "-C", str(_ROOT), *words], capture_output=True, text=True, check=False)
+    return done.stdout.strip()
+
+
+def made_by(result: Mapping[str, Any]) -> str:
+    """Say by which command and at which commit a result was made, as `stale` reads it."""
+    return f"Made by `{result['command']}` at {result['commit']}."
 
 
 def _version(package: str) -> str | None:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import common
+from benchmarks.provenance import provenance
 from benchmarks.rig_scenes import draw_scene, judge, true_offset
 from jeat_graph.data.errors import DataError
 from jeat_graph.eval.tables import Cell, Table
@@ -46,7 +47,8 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     """Draw rigs, register them, judge."""
     seeds = args.seeds or range(_QUICK_ROADS if args.quick else _ROADS)
     wanted = [("road", seed) for seed in seeds] + list(_DEGENERATE.items())
-    return {"settings": {"roads": len(seeds)}, "rigs": [measure_rig(kind, seed) for kind, seed in wanted]}
+    head = {"benchmark": "rigs", **provenance({"roads": len(seeds)}, {})}
+    return {**head, "rigs": [measure_rig(kind, seed) for kind, seed in wanted]}
 
 
 def measure_rig(kind: str, seed: int) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from benchmarks.provenance import commit, made_by
 from benchmarks.readme import update_readme
 from benchmarks.speed_worker import SCANS_A_MINUTE, ask
 from jeat_graph.config.argument_types import counting
@@ -45,13 +46,14 @@ def run(args: argparse.Namespace) -> int:
     if not args.quick:
         # The first child may have to compile; its time counts nowhere.
         ask({"job": "start_up"})
-    result: dict[str, Any] = {"steps": _steps(args), "start_up": _start_up(args)}
+    result: dict[str, Any] = {"command": args.words, "commit": commit()}
+    result |= {"steps": _steps(args), "start_up": _start_up(args)}
     result["real_time"] = _real_time(args)
     if args.hour:
         result["hour"] = ask({"job": "endurance", "scans": _HOUR, "objects": 5})
     sys.stdout.write(_tables(result))
     if args.readme is not None:
-        update_readme(args.readme, {"speed": f"```text\n{_tables(result)}```"})
+        update_readme(args.readme, {"speed": f"```text\n{_tables(result)}```\n\n{made_by(result)}"})
     if args.out is not None:
         _write(result, args)
     return 0

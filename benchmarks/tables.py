@@ -1,4 +1,4 @@
-"""`python -m benchmarks mot|kitti|mevdt|etram|dsec-det|real|simulated`: trackers on sets of recordings.
+"""`python -m benchmarks mot|kitti|mevdt|…|real|simulated`: trackers on sets of recordings.
 
 Ours with a preset as it comes, and the peers with their defaults, on all detectors of a set and on each
 alone. Both of our tables are judged by all that `eval` knows.

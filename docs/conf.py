@@ -49,6 +49,7 @@ html_theme = "furo"
 html_title = "jeat-graph"
 html_static_path = ["_static"]
 html_css_files = ["extra.css"]
+html_js_files = ["copy.js"]
 html_search_scorer = str(Path(__file__).parent / "_static" / "scorer.js")
 html_copy_source = False
 html_show_sphinx = False

@@ -15,6 +15,7 @@ from jeat_graph.api.beside import COMMAND_GROUP, FUNCTION_GROUP, find
 from jeat_graph.cli.options import add_config
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
+from jeat_graph.data.errors import ConfigError
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
@@ -30,6 +31,8 @@ COLUMNS = ("sensors", "MOTA", "HOTA", "IDF1", "FP", "FN", "IDSW")
 SCENARIO = "night-nolight"
 DURATION_S = 24.0
 SEED = 7
+#: Options of `--film`.
+_OF_FILMS = ("frames", "events", "line", "lines")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,11 +50,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="go the whole way with a short clip as well: simulate pictures and events, find the vehicles in "
         "them, track, judge, and draw a film and a strip of pictures",
     )
+    film = parser.add_argument_group("a film instead of all this")
+    add = film.add_argument
+    add(
+        "--film",
+        action="store_true",
+        help="make film.mp4 of twenty seconds of a simulated highway at night, both cameras side by side, "
+        "with causal and smoothed tracks and counts (needs jeat-graph-sehn; ten minutes of one core), or of "
+        "a recording of yours: jeat-graph demo --film --frames street.mp4 --line 0,400,1280,400",
+    )
+    add("--frames", metavar="VIDEO|DIR", help="with --film: draw and track this video, folder or AEDAT4 file")
+    add("--events", metavar="FILE", help="with --frames: events of the same scene, beside the pictures")
+    add("--line", action="append", default=[], metavar="[NAME=]X1,Y1,X2,Y2", help="with --frames: count here")
+    add("--lines", action="append", default=[], metavar="FILE.yaml", help="with --frames: lines of `draw`")
 
 
 def run(args: argparse.Namespace) -> int:
     """Track, judge, draw, and say where everything is."""
     out = Path(args.out)
+    if args.film:
+        return _film(args, out)
+    given = next((name for name in _OF_FILMS if getattr(args, name)), None)
+    if given is not None:
+        raise ConfigError(f"--{given} is of the film: add --film")
     if not args.from_raw:
         _show(args, out)
         _say_next()
@@ -64,6 +85,23 @@ def run(args: argparse.Namespace) -> int:
         return code
     _say_next()
     return 0
+
+
+def _film(args: argparse.Namespace, out: Path) -> int:
+    """Make the film of the simulated highway, or of the user's own recording."""
+    from jeat_graph.cli.demo_film import make_film, recorded_commands, simulated_commands
+
+    if args.from_raw or _is_simulated(args):
+        raise ConfigError(
+            "--film has a scenario of its own: leave out --from-raw, --scenario, --duration, --seed"
+        )
+    if args.frames is not None:
+        return make_film(out, recorded_commands(out, args))
+    given = next((name for name in _OF_FILMS[1:] if getattr(args, name)), None)
+    if given is not None:
+        raise ConfigError(f"--{given} goes with --frames: the simulated film has its own")
+    find(COMMAND_GROUP, "simulate", "--film")  # says so now if it is not installed
+    return make_film(out, simulated_commands(out, args.config))
 
 
 def _is_simulated(args: argparse.Namespace) -> bool:

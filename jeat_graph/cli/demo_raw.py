@@ -41,16 +41,19 @@ def go_the_whole_way(out: Path) -> int:
     Returns:
         The exit code of the first that failed; 0 if none did.
     """
-    for one in commands(out):
-        if code := _run(one):
-            return code
+    if code := in_order(commands(out)):
+        return code
     print(f"film      {out / 'raw.mp4'} (moments of it: {out / 'raw.png'}), pictures left, events right")
     print()
     return 0
 
 
-def _run(arguments: Sequence[str]) -> int:
+def in_order(commands: Sequence[Sequence[str]]) -> int:
+    """Run commands of `jeat-graph` until one fails, and say each before; returns the last exit code."""
     from jeat_graph.cli.main import main
 
-    say("demo", f"jeat-graph {' '.join(arguments)}")
-    return main(arguments)
+    for arguments in commands:
+        say("demo", f"jeat-graph {' '.join(arguments)}")
+        if code := main(arguments):
+            return code
+    return 0

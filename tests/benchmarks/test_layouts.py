@@ -190,3 +190,97 @@ def test_what_is_wrong_with_a_folder_is_said(tmp_path):
     (tmp_path / "MOT20" / "train" / "MOT20-01" / "seqinfo.ini").write_text("[Sequence]\nframeRate=fast\n")
     with pytest.raises(DataError, match=r"seqinfo.ini: cannot be read"):
         read_sets("mot", tmp_path, LayoutOptions())
+
+
+DSEC_MOT = "54828357559,10,178,222,100,70,0\n54828357559,11,10,20,30,40,6\n54828407559,10,180,222,100,70,0\n"
+
+
+def test_dsec_mot_has_a_text_file_a_sequence_with_times_in_microseconds(tmp_path):
+    folder = tmp_path / "train"
+    folder.mkdir()
+    (folder / "zurich_city_00_b.txt").write_text(DSEC_MOT)
+    (folder / "readme.txt").write_text("seven fields a line\n")
+    contract_text(tmp_path / "boxes" / "zurich_city_00_b.csv")
+    how = LayoutOptions((("evt", tmp_path / "boxes"),))
+    (found,) = read_sets("dsec-mot", tmp_path, how)
+    (recording,) = found.recordings
+    assert (recording.name, recording.image) == ("zurich_city_00_b", (640.0, 480.0))
+    truth = recording.truth
+    np.testing.assert_allclose(truth.t, [54828.357559, 54828.357559, 54828.407559], rtol=0, atol=1e-9)
+    assert truth.object_id.tolist() == [10, 11, 10]
+    assert truth.boxes[0].tolist() == [178.0, 222.0, 100.0, 70.0]
+    assert truth.classes.tolist() == ["car", "train", "car"]
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("54828357559,10,0,0,5,5,0", "track 10 is there twice at 54828357559"),
+        ("54828457559,10,0,0,5,5,7", "class 7: DSEC-MOT has 0 to 6"),
+        ("54828457559,10,0,0,-5,5,1", "a negative width or height"),
+        ("54828457559,10,0,0,5,5", "4"),
+    ],
+)
+def test_a_wrong_line_of_dsec_mot_is_named(tmp_path, line, message):
+    (tmp_path / "a.txt").write_text(DSEC_MOT + line + "\n")
+    contract_text(tmp_path / "boxes" / "a.csv")
+    with pytest.raises(DataError, match=message) as raised:
+        read_sets("dsec-mot", tmp_path, LayoutOptions((("evt", tmp_path / "boxes"),)))
+    assert "a.txt:4" in str(raised.value)
+
+
+def openlabel(path, objects, **properties):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    held = {
+        key: {
+            "object_data": {"name": f"CAR_{key}", "type": kind, "bbox": [{"name": "full_bbox", "val": box}]}
+        }
+        for key, (kind, box) in objects.items()
+    }
+    frame = {"objects": held, "frame_properties": properties}
+    path.write_text(
+        json.dumps({"openlabel": {"metadata": {"schema_version": "1.0.0"}, "frames": {"0": frame}}})
+    )
+
+
+def test_tumtraf_is_a_folder_of_openlabel_files_with_centres_and_keys_that_stay(tmp_path):
+    folder = tmp_path / "test" / "labels_rgb"
+    openlabel(folder / "20231114-085428.179411.json", {"a4": ("CAR", [120, 90, 40, 80])})
+    openlabel(folder / "20231114-085428.379411.json", {})
+    openlabel(
+        folder / "20231114-085428.579411.json",
+        {"b7": ("TRUCK", [300, 100, 100, 60]), "a4": ("CAR", [124, 90, 40, 80])},
+    )
+    contract_text(tmp_path / "boxes" / "labels_rgb.csv")
+    (found,) = read_sets("tumtraf", tmp_path, LayoutOptions((("rgb", tmp_path / "boxes"),)))
+    truth = found.recordings[0].truth
+    np.testing.assert_allclose(truth.t, [0.0, 0.4, 0.4], atol=1e-6)
+    np.testing.assert_allclose(truth.frame_times(), [0.0, 0.2, 0.4], atol=1e-6)
+    assert truth.boxes.tolist() == [[100, 50, 40, 80], [250, 70, 100, 60], [104, 50, 40, 80]]
+    assert truth.classes.tolist() == ["car", "truck", "car"]
+    assert truth.object_id[0] == truth.object_id[2] != truth.object_id[1]
+
+
+def test_openlabel_says_its_time_by_its_frame_or_by_its_name(tmp_path):
+    for name, properties in (("1651673050_250000000_s110_camera", {}), ("b", {"timestamp": 1651673050.75})):
+        openlabel(tmp_path / "labels" / f"{name}.json", {"a4": ("CAR", [5, 5, 2, 2])}, **properties)
+    contract_text(tmp_path / "boxes" / "labels.csv")
+    how = LayoutOptions((("rgb", tmp_path / "boxes"),))
+    (found,) = read_sets("tumtraf", tmp_path, how)
+    np.testing.assert_allclose(found.recordings[0].truth.t, [0.0, 0.5], atol=1e-6)
+    openlabel(tmp_path / "labels" / "c.json", {})
+    with pytest.raises(DataError, match=r"c.json: neither frame_properties.timestamp nor its name"):
+        read_sets("tumtraf", tmp_path, how)
+
+
+def test_openlabel_whose_objects_are_numbered_anew_in_each_file_is_refused(tmp_path):
+    for k in range(2):
+        two = {"0": ("CAR", [5, 5, 2, 2]), "1": ("CAR", [9, 9, 2, 2])}
+        openlabel(tmp_path / "labels" / f"{k}.json", two, timestamp=0.1 * k)
+    contract_text(tmp_path / "boxes" / "labels.csv")
+    how = LayoutOptions((("rgb", tmp_path / "boxes"),))
+    with pytest.raises(DataError, match="numbered from 0 in each file"):
+        read_sets("tumtraf", tmp_path, how)
+    openlabel(tmp_path / "labels" / "0.json", {"a4": ("CAR", [5, 5, 2])}, timestamp=0.0)
+    with pytest.raises(DataError, match=r"0.json: bbox \[5, 5, 2\] is not"):
+        read_sets("tumtraf", tmp_path, how)

@@ -18,6 +18,8 @@ from jeat_graph.io.media.video import RgbImage
 Alpha = npt.NDArray[np.float32]
 _KEPT_TEXTS = 4096
 _WHITE = 255
+#: What is left of the picture behind letters that stand on a ground of their own.
+_SHADE = np.float32(0.3)
 
 
 class Place(NamedTuple):
@@ -92,6 +94,14 @@ def room_for(painted: Letters, corner: tuple[float, float], size_px: tuple[int, 
     below = height - painted.ascent
     bottom = min(max(round(corner[1]) + below, height + 1), max(size_px[1] - 1, height))
     return Place(left, bottom - height, left + width, bottom)
+
+
+def darken(image: RgbImage, place: Place, margin_px: int) -> None:
+    """Darken a rectangle of a picture (H, W, 3) and a margin around it, so that letters are read on it."""
+    rows = slice(max(place.top - margin_px, 0), max(place.bottom + margin_px, 0))
+    columns = slice(max(place.left - margin_px, 0), max(place.right + margin_px, 0))
+    part = image[rows, columns]
+    part[:] = np.rint(_SHADE * part + (1.0 - _SHADE) * np.array(RIM, dtype=np.float32))
 
 
 def paint(image: RgbImage, painted: Letters, place: Place, colour: Rgb) -> None:

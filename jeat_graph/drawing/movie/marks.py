@@ -8,7 +8,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.drawing.movie.captions import Captions
-from jeat_graph.drawing.movie.lettering import Letters, Place, letters, paint, room_for
+from jeat_graph.drawing.movie.lettering import Letters, Place, darken, letters, paint, room_for
 from jeat_graph.drawing.movie.moments import Marks
 from jeat_graph.drawing.movie.totals import COUNTER_RGB, Counter
 from jeat_graph.drawing.palette import RIM, Rgb, track_rgb
@@ -19,6 +19,8 @@ SIGMAS = 2.0
 NAME_SIZE = 0.42
 #: The same of what a line has counted.
 COUNTER_SIZE = 0.6
+#: Between a line and what it has counted, and of the dark ground around a text, in a picture 720 px high.
+_CLEAR_PX, _GROUND_PX = 12.0, 3.0
 _SHIFT = 4  # OpenCV takes coordinates in sixteenths of a pixel
 #: Lightness of the smoothed tracks' colours.
 PALE = 0.82
@@ -108,9 +110,11 @@ class Canvas:
             paint(self.image, painted, place, colours[k])
 
     def text(self, text: str, place: tuple[float, float], colour: Rgb, size: float) -> None:
-        """Write a text with its lower left corner at a pixel, moved so that it is within the picture."""
+        """Write a text on a dark ground, with its lower left corner at a pixel, moved into the picture."""
         painted = self._letters(text, size)
-        paint(self.image, painted, room_for(painted, place, self._size_px), colour)
+        room = room_for(painted, place, self._size_px)
+        darken(self.image, room, round(_GROUND_PX * self.unit))
+        paint(self.image, painted, room, colour)
 
     def _letters(self, text: str, size: float) -> Letters:
         return letters(text, size * self.unit, max(round(self.unit), 1))
@@ -212,5 +216,6 @@ def draw_counters(canvas: Canvas, counters: Sequence[Counter]) -> None:
 def draw_totals(canvas: Canvas, counters: Sequence[Counter], t: float) -> None:
     """Write how many have crossed each line and zone so far (t: s)."""
     for counter in counters:
-        middle = counter.corners.mean(axis=0) * canvas.scale
-        canvas.text(counter.text(t), (float(middle[0]), float(middle[1])), COUNTER_RGB, COUNTER_SIZE)
+        x, y = (counter.corners.mean(axis=0) * canvas.scale).tolist()
+        clear = _CLEAR_PX * canvas.unit  # of the line itself
+        canvas.text(counter.text(t), (x + clear, y - clear), COUNTER_RGB, COUNTER_SIZE)

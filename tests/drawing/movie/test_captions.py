@@ -14,6 +14,7 @@ from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.drawing.movie.captions import CLASS, NUMBER, PARTS, SPEED, Captions, read_speeds
 from jeat_graph.drawing.movie.film import H264, VP9, MovieWriter
+from jeat_graph.drawing.movie.marks import Canvas, draw_counters, draw_totals
 from jeat_graph.drawing.movie.totals import COUNTER_RGB, Counter
 from jeat_graph.eval.counting import Line
 from jeat_graph.eval.zones import Zone
@@ -78,8 +79,19 @@ def test_lines_are_drawn_where_they_lie(run, tmp_path):
     assert main(["render", str(run), *words, "--out", str(out)]) == 0
     picture = cv2.imread(str(out))[..., ::-1].astype(int)
     line = np.abs(picture - COUNTER_RGB).max(axis=2) < 40
-    assert line[6:16, 68:73].any(axis=1).all()
-    assert not line[4:16, :40].any()  # what it has counted is written below
+    assert line[28:40, 68:73].any(axis=1).all()
+    assert not line[28:40, :40].any()  # what it has counted is written above
+
+
+def test_what_a_line_has_counted_stands_clear_of_a_level_line():
+    canvas = Canvas(np.zeros((200, 400, 3), dtype=np.uint8), (1.0, 1.0))
+    counter = Counter(Line(20.0, 100.0, 380.0, 100.0, "gate"), vehicle([0.0, 0.1], 7))
+    draw_counters(canvas, [counter])
+    line = canvas.image.any(axis=2)
+    draw_totals(canvas, [counter], 0.0)
+    written = canvas.image.any(axis=2) & ~line
+    assert written.any()
+    assert np.flatnonzero(written.any(axis=1)).max() < np.flatnonzero(line.any(axis=1)).min()
 
 
 def test_what_is_shown_needs_tracks(fails, tmp_path):

@@ -69,3 +69,19 @@ def test_the_larger_box_keeps_its_name_where_two_collide():
 def test_rectangles_that_only_touch_do_not_meet():
     assert not Place(0, 0, 10, 10).meets(Place(10, 0, 20, 10))
     assert Place(0, 0, 10, 10).meets(Place(9, 9, 20, 20))
+
+
+def test_a_text_stands_on_a_ground_of_its_own_on_any_picture():
+    noise = np.random.default_rng(0).integers(0, 256, (120, 400, 3), dtype=np.uint8)
+    canvas = Canvas(noise.copy(), (1.0, 1.0))
+    canvas.text("t = 1.000 s", (20.0, 60.0), (255, 255, 255), 1.0)
+    changed = (canvas.image != noise).any(axis=2)
+    rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
+    ground = canvas.image[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    letters = ground.min(axis=2) > 200
+    assert 0.02 < letters.mean() < 0.5
+    # Where nothing is written the picture is left, at three tenths of its light.
+    np.testing.assert_allclose(
+        ground[0].astype(float), 0.3 * noise[rows[0], columns[0] : columns[-1] + 1], atol=12
+    )
+    assert not changed[: rows[0]].any()

@@ -30,7 +30,6 @@ from jeat_graph_sehn.simulation.world.vehicles import KIND_NAMES, KINDS, Fleet
 
 DENSITIES = ("sparse", "normal", "dense")
 _WARM_UP_S = 15.0
-_STOP_BEFORE_S = 8.0  # the start of the recording, when vehicles that stop begin to brake
 _MARGIN_S = 1.0  # paths reach this much before time zero and past the end
 
 
@@ -46,6 +45,7 @@ class TrafficConfig:
     parked_m: tuple[float, float] = number((28.0, 120.0), "m", "from where to where along the road", -20.0)
     stopped: int = number(0, "vehicles", "vehicles that stop in their lane within view", 0, 8)
     stop_s: tuple[float, float] = number((5.0, 60.0), "s", "for how long they stand, shortest and longest")
+    stop_at_s: float = number(-8.0, "s", "when they begin to brake, from the start of the recording", -15.0)
     view_m: float = number(150.0, "m", "length of road that the counts refer to", open_low=True)
     ring_m: float = number(420.0, "m", "length of the ring, of which the camera sees a part", 300.0)
     behind_m: float = number(130.0, "m", "how much of the ring lies behind the gantry", 30.0)
@@ -116,7 +116,7 @@ def simulate_traffic(
     start = -_MARGIN_S - _WARM_UP_S
     steps = math.ceil((duration_s + _MARGIN_S - start) / dt)
     decide_every = max(1, round(0.25 / dt))
-    stop_at = round((_WARM_UP_S + _MARGIN_S - _STOP_BEFORE_S) / dt) if config.stopped else -1
+    stop_at = round((_WARM_UP_S + _MARGIN_S + config.stop_at_s) / dt) if config.stopped else -1
 
     may_use = _lanes_of(fleet, road)
     occupied = np.zeros((count, road.num_lanes), dtype=bool)

@@ -1,5 +1,6 @@
 """Traffic: smooth, free of collisions, as dense as configured."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -115,3 +116,19 @@ def test_too_much_traffic_is_refused() -> None:
     jam = TrafficConfig(vehicles_normal=400.0)
     with pytest.raises(ConfigError, match="no room"):
         Scene.build(0, 5.0, s.road, s.fleet, jam, s.light, s.camera)
+
+
+def test_a_vehicle_stops_when_the_scenario_says_and_the_next_one_waits_behind_it() -> None:
+    s = load_scenario("night-nolight-stop")
+    scene = Scene.build(0, 21.1, s.road, s.fleet, replace(s.traffic, stopped=3), s.light, s.camera)
+    begin, end = scene.traffic.paths.along_at(np.array([s.traffic.stop_at_s, 20.5]))[1]
+    stood = (begin > 5.0) & (end < 0.1)
+    assert stood.sum() >= 3
+    still = scene.traffic.paths.along_at(np.array([s.traffic.stop_at_s - 0.1]))[1][0, stood]
+    assert (still > 5.0).all()
+
+
+def test_who_stops_begins_to_brake_before_the_recording_unless_told_otherwise() -> None:
+    assert TrafficConfig().stop_at_s == -8.0
+    with pytest.raises(ConfigError, match="stop_at_s"):
+        TrafficConfig(stop_at_s=-20.0)
