@@ -41,13 +41,17 @@ class Step {
 public:
     explicit Step(State& state) : s_(state), c_(state.constants) {}
 
-    // Take in all scans of one time, at most one of each sensor; `reported` is written.
-    void run(double t, std::vector<Scan>& scans, std::vector<std::uint8_t>& reported, Record* record) {
+    // Take in all scans of one time, at most one of each sensor; `motion`, if known, is that of the camera since its
+    // picture before. `reported` is written.
+    void run(double t, std::vector<Scan>& scans, const PictureMotion* motion, std::vector<std::uint8_t>& reported,
+             Record* record) {
         std::fill(s_.tracks.used.begin(), s_.tracks.used.end(), 0);
+        step_s_ = s_.started ? s_.t : t;
         for (const std::size_t place : order_of(scans)) {
             Scan& scan = scans[place];
             const ScanClock clock = look(t, scan);
             predict(t);
+            follow_picture(motion);
             correct_boxes(scan);
             follow_camera(scan);
             if (record) write_predictions(*record, scan.sensor);
@@ -110,6 +114,7 @@ public:
         s_.learnt_s = t - clamp(s_.t - s_.learnt_s, 0.0, kLongestAgoS);
         s_.t = t;
         s_.started = false;
+        s_.camera_velocity = {};
     }
 
 private:
@@ -184,9 +189,23 @@ private:
         const Densities densities(s_.process_noise, exp_of(s_.log_scene_variance()));
         Tracks& tracks = s_.tracks;
         for (std::size_t i = 0; i < tracks.size(); ++i) {
-            filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, densities, c_);
+            with_camera(tracks.mean_of(i), s_.camera_velocity, dt, [&] {
+                filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, densities, c_);
+            });
             predict_presence(tracks.presence.data() + i * kPresences, presence_step_);
         }
+    }
+
+    // Once a time: with its first scan.
+    void follow_picture(const PictureMotion* motion) {
+        CameraVelocity& camera = s_.camera_velocity;
+        camera = camera.at(s_.t);
+        if (!motion || s_.t <= camera.picture_s) return;
+        const CameraVelocity now = CameraVelocity::after(*motion, s_.t);
+        Tracks& tracks = s_.tracks;
+        for (std::size_t i = 0; i < tracks.size(); ++i)
+            follow(tracks.mean_of(i), tracks.covariance_of(i), tracks.evidence.last_s[i], *motion, camera, now, step_s_);
+        camera = now;
     }
 
     void correct_boxes(const Scan& scan) {
@@ -387,6 +406,7 @@ private:
                     overlap = std::max(overlap, intersection_over_union(boxes_[j], free_boxes_[g]));
             });
             initial_state(boxes_[j], edges_[j], rho2, exp_of(s_.log_scene_variance()), c_, tracks.mean_of(row), tracks.covariance_of(row));
+            with_velocity(tracks.mean_of(row), s_.camera_velocity);
             tracks.track_id[row] = s_.next_id++;
             tracks.used[row] = std::int64_t{1} << k;
             see_presence(tracks.presence.data() + row * kPresences);
@@ -534,6 +554,7 @@ private:
     std::vector<std::array<double, 4>> innovations_;  // of the pairs that are made
     std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
     std::vector<CameraTrack> camera_tracks_;
+    double step_s_ = 0.0;  // time of the last step (s)
     std::vector<Edges> edges_;  // of the scan's boxes
 };
 
