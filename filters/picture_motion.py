@@ -5,9 +5,9 @@ rotation φ (rad, from x to y) about the centre c of the points that were follow
 errors of a least squares fit of d, s and φ are uncorrelated, so that four variances tell all.
 
 Velocities of tracks are those in the picture, and the camera's is part of them; where tracks are predicted,
-it is left out and goes straight on by itself. What tracks cannot know is how it changes, u = θ/Δ − u', with u'
-that of the last picture: u is added to their velocities, and u times the time that they have gone on by the old
-one to their positions.
+it is left out and goes straight on by itself. What tracks cannot know is how it changes, u = θ/Δ − u', with
+u' that of the last picture: u is added to their velocities, and u times the time that they have gone on by
+the old one to their positions.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def before_prediction(mean: FloatArray, camera: CameraVelocity) -> tuple[FloatAr
 
 
 def after_prediction(mean: FloatArray, moves: FloatArray, camera: CameraVelocity, dt: float) -> FloatArray:
-    """Return states (N, 2, 7) that went by the camera's velocity, too, which goes straight on for `dt` (s)."""
+    """Return states (N, 2, 7) that went by the camera's velocity, too, for `dt` (s)."""
     out = mean.copy()
     out[:, :, POSITION] += moves * dt
     out[:, :, VELOCITY] += displacement(camera.rate, camera.centre, out[:, :, POSITION])

@@ -22,9 +22,9 @@ from jeat_graph.io.media.decoders import RgbImage
 Grey = npt.NDArray[np.uint8]
 
 # Corners: how many, how good against the best one, how far apart (px of the working picture).
-_CORNERS, _QUALITY, _APART_PX = 250, 0.01, 7.0
+_CORNERS, _QUALITY, _APART_PX = 120, 0.01, 10.0
 # Half a window of Lucas and Kanade (px), and levels of its pyramid above the picture.
-_WINDOW_PX, _LEVELS = 15, 3
+_WINDOW_PX, _LEVELS = 10, 3
 # A corner that is followed there and back ends where it began, within this (px).
 _RETURN_PX = 0.5
 # Inliers of RANSAC (px): of a picture that moves as one, or of one with depth, which is tried next.
@@ -34,8 +34,8 @@ _LEAST, _LEAST_SHARE, _LEAST_SPREAD = 15, 0.5, 0.08
 # Boxes are taken larger by this share on each side: detectors cut, and shadows go along.
 _MARGIN = 0.1
 # Degrees of freedom of t, reweightings, and the least error of a corner (px). Corners near each other err
-# alike: so many count for one.
-_DEGREES, _PASSES, _LEAST_ERROR_PX, _ALIKE = 4.0, 4, 0.05, 4.0
+# alike, so many count for one, and all of them by so much (px): what interpolation between pixels costs.
+_DEGREES, _PASSES, _LEAST_ERROR_PX, _ALIKE, _COMMON_PX = 4.0, 4, 0.05, 4.0, 0.03
 # A camera moves if the corners of its picture do by more than this (px), and by so many standard deviations;
 # after that for so long (s) every motion is told.
 _STILL_PX, _STILL_DEVIATIONS, _MOVES_S = 0.1, 4.0, 5.0
@@ -232,9 +232,8 @@ def similarity(before: npt.NDArray[np.complex128], after: npt.NDArray[np.complex
         # Of one axis; two axes of N points less four unknowns.
         var = float(max((weight @ error2) / max(2.0 * len(before) - 4.0, 1.0), _LEAST_ERROR_PX**2))
         weight = (_DEGREES + 2.0) / (_DEGREES + error2 / var)
-    return Pose(
-        turn, complex(to - turn * centre), complex(centre), (_ALIKE * var / total, _ALIKE * var / spread)
-    )
+    by_shift = _ALIKE * var / float(total) + _COMMON_PX**2
+    return Pose(turn, complex(to - turn * centre), complex(centre), (by_shift, _ALIKE * var / spread))
 
 
 def _going(pose: Pose, shape: tuple[int, ...]) -> npt.NDArray[np.complex128]:
