@@ -122,12 +122,13 @@ def follow(
     step_s, t = times
     now = CameraVelocity(motion.centre, motion.theta / motion.span_s, t, t + _SPANS_KNOWN * motion.span_s)
     place = mean[:, :, POSITION]
-    change = displacement(now.rate, now.centre, place) - displacement(before.rate, before.centre, place)
+    old = displacement(before.rate, before.centre, place)
+    change = displacement(now.rate, now.centre, place) - old
     unseen = np.maximum(step_s - np.maximum(last_s, t - motion.span_s), 0.0)
     elapsed = t - step_s + unseen
     mean, covariance = mean.copy(), covariance.copy()
     mean[:, :, POSITION] += change * elapsed[:, None]
-    mean[:, :, VELOCITY] += change
+    mean[:, :, VELOCITY] += displacement(now.rate, now.centre, mean[:, :, POSITION]) - old
     grown = now.rate[2] - before.rate[2]
     mean[:, :, LOG_SIZE] += (grown * elapsed)[:, None]
     mean[:, :, GROWTH] += grown

@@ -37,7 +37,7 @@ def motion_of(values: npt.ArrayLike) -> FloatArray:
         found = np.array(values, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):
         raise DataError(_WRONG) from None
-    if len(found) != MOTION_NUMBERS or bad_motions(found[None]).any():
+    if len(found) != MOTION_NUMBERS or np.isnan(found).any() or bad_motions(found[None]).any():
         raise DataError(_WRONG)
     return found
 

@@ -31,6 +31,8 @@ _RETURN_PX = 0.5
 _INLIER_PX = (1.0, 3.0)
 # So many corners at least must agree, so large a share of those found, spread over so much of either side.
 _LEAST, _LEAST_SHARE, _LEAST_SPREAD = 15, 0.5, 0.08
+# The light is compared in every so many pixels each way, and is the same within this share.
+_EVERY, _SAME_LIGHT = 4, 0.01
 # Boxes are taken larger by this share on each side: detectors cut, and shadows go along.
 _MARGIN = 0.1
 # Degrees of freedom of t, reweightings, and the least error of a corner (px). Corners near each other err
@@ -149,6 +151,7 @@ class CameraFlow:
 
         if len(key.corners) < _LEAST:
             return None, 0
+        grey = _in_light_of(key.grey, grey)
         turn, shift = self._step
         guess = _points(turn * self._pose.of(_complex(key.corners)) + shift)
         options = {
@@ -249,6 +252,18 @@ def _is_moved(pose: Pose, shape: tuple[int, ...]) -> bool:
     corner = np.array([0.0, width, 1j * height, width + 1j * height])
     std = np.sqrt(pose.variance[0] + pose.variance[1] * np.abs(corner - pose.centre) ** 2)
     return bool((np.abs(_going(pose, shape)) > np.maximum(_STILL_PX, _STILL_DEVIATIONS * std)).any())
+
+
+def _in_light_of(key: Grey, grey: Grey) -> Grey:
+    """Return a picture as bright as its key picture: most pixels have become brighter by the light."""
+    import cv2
+
+    few = slice(None, None, _EVERY)
+    brighter = np.log((grey[few, few] + 1.0) / (key[few, few] + 1.0))
+    gain = float(np.exp(-np.median(brighter)))
+    if abs(gain - 1.0) < _SAME_LIGHT:
+        return grey
+    return np.asarray(cv2.convertScaleAbs(grey, alpha=gain, beta=gain - 1.0), dtype=np.uint8)
 
 
 def _outside(shape: tuple[int, ...], boxes: FloatArray) -> BoolArray:

@@ -67,12 +67,13 @@ inline void follow(double* mean, double* covariance, double last_s, const Pictur
         double *const m = mean + axis * kStates, *const P = covariance + axis * kMatrix;
         const double change = to[axis] - from[axis];
         m[kPosition] += change * elapsed;
-        m[kVelocity] += change;
         m[kLogSize] += grown * elapsed;
         m[kGrowth] += grown;
         P[kPosition * kStates + kPosition] += share * (motion.variance[axis] + apart[axis]);
         P[kLogSize * kStates + kLogSize] += share * motion.variance[2];
     }
+    const auto onwards = now.rate.displacement(mean[kPosition], mean[kStates + kPosition]);
+    for (int axis = 0; axis < 2; ++axis) mean[axis * kStates + kVelocity] += onwards[axis] - from[axis];
 }
 
 // Predict a track by `predict`, which is told of its own velocity only: the camera's goes straight on for `dt` (s).
