@@ -1,4 +1,4 @@
-"""Settings of detectors, from YAML: `frames`, `events`, and of networks `model_frames` and its like."""
+"""Settings of detectors, from YAML: `frames`, `events`, of networks `model_frames` and its like, `camera`."""
 
 from __future__ import annotations
 
