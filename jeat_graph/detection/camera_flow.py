@@ -154,7 +154,7 @@ class CameraFlow:
         grey = _in_light_of(key.grey, grey)
         turn, shift = self._step
         guess = _points(turn * self._pose.of(_complex(key.corners)) + shift)
-        options = {
+        options: dict[str, Any] = {
             "winSize": (2 * _WINDOW_PX + 1, 2 * _WINDOW_PX + 1),
             "maxLevel": _LEVELS,
             "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
@@ -164,7 +164,7 @@ class CameraFlow:
         back, again, _ = cv2.calcOpticalFlowPyrLK(grey, key.grey, there, start, **options)
         good = (ok.ravel() == 1) & (again.ravel() == 1)
         good &= np.linalg.norm((back - key.corners).reshape(-1, 2), axis=1) < _RETURN_PX
-        good &= _is_seen(there.reshape(-1, 2), seen)
+        good &= _is_seen(np.asarray(there, dtype=np.float32).reshape(-1, 2), seen)
         count = int(good.sum())
         if count < _LEAST:
             return None, count
@@ -281,7 +281,7 @@ def _is_seen(points: npt.NDArray[np.float32], seen: BoolArray) -> BoolArray:
     x, y = np.round(points).astype(np.int64).T
     inside = (x >= 0) & (y >= 0) & (x < seen.shape[1]) & (y < seen.shape[0])
     inside[inside] = seen[y[inside], x[inside]]
-    return inside
+    return np.asarray(inside, dtype=np.bool_)
 
 
 def _in_picture(motion: FloatArray, scale: float) -> FloatArray:
