@@ -131,8 +131,8 @@ def scan_with_area(
         if flat.any() and all(one is None or len(one) == len(flat) for one in columns):
             columns = [None if one is None else np.asarray(one)[~flat] for one in columns]
     motion = None if camera_motion is None else motion_of(camera_motion)
-    boxes, scores, classes, embeddings = columns
-    return Scan(t, sensor, boxes, scores, classes, embeddings, motion), int(flat.sum())
+    made = Scan(t, sensor, columns[0], columns[1], columns[2], columns[3], motion)
+    return made, int(flat.sum())
 
 
 def trusted_scan(

@@ -1,6 +1,6 @@
 """The reference tracker's step in NumPy: the definition of the model, as the method's page has it.
 
-predict → follow the picture → correct boxes → follow the camera → associate → update → hits and misses
+predict → correct boxes → follow the picture → follow the camera → associate → update → hits and misses
 → births → compare sensors → posterior → learn → report → end.
 
 Every stage has what it reads and writes in its name and in `ReferenceState`; the formulas are in the modules
@@ -122,8 +122,8 @@ def step(
         clock = look(state, t, given, c)
         dt = 0.0 if state.t is None else t - state.t
         transition = predict(state, t, c)
-        follow_picture(state, motion, step_s)
         scan = correct_boxes(state, given, c)
+        follow_picture(state, scan, motion, step_s, c)
         follow_camera(state, scan, dt, c)
         before = state.tracks
         noise_scale[place] = math.exp(state.log_side_variance[given.sensor]) / c.side_std**2
@@ -195,19 +195,6 @@ def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
     return F
 
 
-def follow_picture(state: ReferenceState, motion: PictureMotion | None, step_s: float) -> None:
-    """Take tracks, last predicted to `step_s` (s), along with the camera, with the first scan of a time."""
-    t, camera = state.time, state.camera_velocity.at(state.time)
-    state.camera_velocity = camera
-    if motion is None or t <= camera.picture_s:
-        return
-    tracks = state.tracks
-    mean, covariance, state.camera_velocity = picture_motion.follow(
-        tracks.mean, tracks.covariance, tracks.evidence.last_s, motion, camera, (step_s, t)
-    )
-    state.tracks = replace(tracks, mean=mean, covariance=covariance)
-
-
 def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> SensorScan:
     """Return the scan with boxes as the sensors have them on the average, and which sides end at the edge.
 
@@ -220,14 +207,46 @@ def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) ->
     return scan._replace(boxes=sensor_offsets.corrected(scan.boxes, offset), edges=edges)
 
 
+def follow_picture(
+    state: ReferenceState,
+    scan: SensorScan,
+    motion: PictureMotion | None,
+    step_s: float,
+    c: ModelConstants,
+) -> None:
+    """Take tracks, last predicted to `step_s` (s), along with the camera, with the first scan of a time.
+
+    A motion that the scan's boxes speak against is none.
+    """
+    t, camera = state.time, state.camera_velocity.at(state.time)
+    state.camera_velocity = camera
+    if motion is None or t <= camera.picture_s:
+        return
+    tracks, sure = state.tracks, surely_there(state, c)
+    mean, covariance, velocity = picture_motion.follow(
+        tracks.mean, tracks.covariance, tracks.evidence.last_s, motion, camera, (step_s, t)
+    )
+    moved = (mean - tracks.mean)[sure, :, singer.POSITION]
+    seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
+    noise = float(state.log_side_variance[scan.sensor])
+    if not camera_motion.contradicted(*seen, noise, moved, state.camera, c):
+        state.tracks, state.camera_velocity = replace(tracks, mean=mean, covariance=covariance), velocity
+
+
+def surely_there(state: ReferenceState, c: ModelConstants) -> BoolArray:
+    """Return which tracks (N,) show the camera's motion."""
+    tracks = state.tracks
+    recent = state.time - tracks.evidence.last_s < _CAMERA_AGE_S
+    return np.asarray((tracks.real > c.report) & (tracks.evidence.detections > _CAMERA_DETECTIONS) & recent)
+
+
 def follow_camera(state: ReferenceState, scan: SensorScan, dt: float, c: ModelConstants) -> None:
     """Estimate what shift and scale all tracks have in common over `dt` seconds, and take them along."""
     dt = singer.whole_microseconds(dt)
     if dt <= 0.0:
         return
     tracks, noise = state.tracks, float(state.log_side_variance[scan.sensor])
-    recent = state.time - tracks.evidence.last_s < _CAMERA_AGE_S
-    sure = (tracks.real > c.report) & (tracks.evidence.detections > _CAMERA_DETECTIONS) & recent
+    sure = surely_there(state, c)
     seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
     motion, state.camera = camera_motion.estimate(*seen, noise, state.picture, dt, state.camera, c)
     if motion is not None:

@@ -87,6 +87,23 @@ def test_boxes_alone_lose_tracks_that_the_pictures_keep():
     assert told == len(np.unique(tracked(scans())[1].track_id)) < alone
 
 
+@pytest.mark.parametrize("engine", ["core", "reference"])
+def test_a_wrong_picture_that_the_boxes_speak_against_is_none(engine):
+    """The camera stands; now and then a picture says that it leapt by 150 px."""
+    leap = [1 / RATE, 800.0, 600.0, 150.0, 0.0, 0.0, 0.0, 0.01, 0.01, 0.0, 0.0]
+    given = [
+        replace(scan, camera_motion=leap) if k in (30, 31, 60, 90) else scan for k, scan in enumerate(scans())
+    ]
+    right, wrong = tracked(scans(), engine), tracked(given, engine)
+    for one, other in zip(right[0], wrong[0], strict=True):
+        np.testing.assert_array_equal(one.mean, other.mean)
+        np.testing.assert_array_equal(one.track_id, other.track_id)
+    alone = [replace(given[30], boxes=np.zeros((0, 4)), scores=np.zeros(0)), *given[31:]]
+    assert tracked([*given[:30], *alone], engine)[0][30].mean[0, 0] > right[0][30].mean[0, 0] + 100.0, (
+        "without boxes it is believed"
+    )
+
+
 def test_uncertainty_of_the_camera_is_in_every_track():
     place = jerks()
     sure, unsure = (tracked(scans(place, variance=one))[0][-1] for one in (0.0, 25.0))

@@ -53,27 +53,39 @@ struct CameraVelocity {
     }
 };
 
-// Take a track along; `step_s` is the time of the tracks' last step, `last_s` of its last detection.
-inline void follow(double* mean, double* covariance, double last_s, const PictureMotion& motion,
-                   const CameraVelocity& before, const CameraVelocity& now, double step_s) {
-    const double t = now.picture_s, place[] = {mean[kPosition], mean[kStates + kPosition]};
-    const auto to = now.rate.displacement(place[0], place[1]), from = before.rate.displacement(place[0], place[1]);
+// How the camera's newest picture changes a track: by a velocity (px/s), for a time (s).
+struct CameraChange {
+    std::array<double, 2> rate, before;
+    double elapsed;
+};
+
+// `step_s` is the time of the tracks' last step, `last_s` of the track's last detection.
+inline CameraChange camera_change(const double* mean, double last_s, const PictureMotion& motion,
+                                  const CameraVelocity& before, const CameraVelocity& now, double step_s) {
+    const double x = mean[kPosition], y = mean[kStates + kPosition], t = now.picture_s;
+    const auto to = now.rate.displacement(x, y), from = before.rate.displacement(x, y);
     const double unseen = std::max(step_s - std::max(last_s, t - motion.span_s), 0.0);
-    const double elapsed = t - step_s + unseen, grown = now.rate.theta[2] - before.rate.theta[2];
+    return {{to[0] - from[0], to[1] - from[1]}, from, t - step_s + unseen};
+}
+
+// Take a track along.
+inline void follow(double* mean, double* covariance, const CameraChange& change, const PictureMotion& motion,
+                   const CameraVelocity& before, const CameraVelocity& now) {
+    const double elapsed = change.elapsed, grown = now.rate.theta[2] - before.rate.theta[2];
     const double share = square(elapsed / motion.span_s);
-    const double x2 = square(place[0] - motion.moved.centre[0]), y2 = square(place[1] - motion.moved.centre[1]);
+    const double x2 = square(mean[kPosition] - motion.moved.centre[0]);
+    const double y2 = square(mean[kStates + kPosition] - motion.moved.centre[1]);
     const double apart[] = {motion.variance[2] * x2 + motion.variance[3] * y2, motion.variance[2] * y2 + motion.variance[3] * x2};
     for (int axis = 0; axis < 2; ++axis) {
         double *const m = mean + axis * kStates, *const P = covariance + axis * kMatrix;
-        const double change = to[axis] - from[axis];
-        m[kPosition] += change * elapsed;
+        m[kPosition] += change.rate[axis] * elapsed;
         m[kLogSize] += grown * elapsed;
         m[kGrowth] += grown;
         P[kPosition * kStates + kPosition] += share * (motion.variance[axis] + apart[axis]);
         P[kLogSize * kStates + kLogSize] += share * motion.variance[2];
     }
     const auto onwards = now.rate.displacement(mean[kPosition], mean[kStates + kPosition]);
-    for (int axis = 0; axis < 2; ++axis) mean[axis * kStates + kVelocity] += onwards[axis] - from[axis];
+    for (int axis = 0; axis < 2; ++axis) mean[axis * kStates + kVelocity] += onwards[axis] - change.before[axis];
 }
 
 // Predict a track by `predict`, which is told of its own velocity only: the camera's goes straight on for `dt` (s).
