@@ -35,6 +35,8 @@ _PAIRING_DEVIATIONS, _PAIRING_MOST = 9.0, 0.16
 _DEGREES, _ITERATIONS = 3.0, 4
 # Fewer tracks tell nothing of a camera.
 _LEAST_TRACKS = 2
+# So many tracks with a box can speak against what pictures show, if fewer than these tenths have one with it.
+_LEAST_WITNESSES, _LEAST_TENTHS = 3, 7
 
 
 class CameraVariance(NamedTuple):
@@ -90,16 +92,7 @@ def estimate(
     """
     if len(mean) < _LEAST_TRACKS or not len(boxes):
         return None, prior
-    size = expected_size(mean)
-    scale = np.sqrt(size.prod(axis=1))
-    R = side_variance(size, log_variance, c)
-    S = _variance_of_sum(covariance, POSITION, POSITION_ERROR) + R / 2.0
-    S_size = _variance_of_sum(covariance, LOG_SIZE, SIZE_ERROR) + 2.0 * R / size**2
-    y = (boxes[:, :2] + boxes[:, 2:])[None] / 2.0 - expected_centre(mean)[:, None]
-    y_size = np.log(boxes[:, 2:] - boxes[:, :2])[None] - np.log(size)[:, None]
-    d2_size = (y_size**2 / S_size[:, None]).sum(axis=2)
-    allowance = min(prior.shift * _PAIRING_DEVIATIONS, _PAIRING_MOST) * scale**2
-    wide = (S + allowance[:, None])[:, None]
+    y, S, wide, d2_size, scale = _compared(mean, covariance, boxes, log_variance, prior, c)
     centre = expected_centre(mean) - np.array(picture) / 2.0
     # The camera may have gone on as before: rows of like objects are else taken for their neighbours.
     again = prior.last[:2] * dt + prior.last[2] * dt * centre
@@ -114,6 +107,34 @@ def estimate(
     precision = 1.0 / np.array([prior.shift * typical**2, prior.shift * typical**2, prior.scale])
     motion = _reweighted_least_squares(y[track, box], S[track], place, precision)
     return motion, _learnt(prior, motion, typical, dt, c)
+
+
+def contradicted(
+    mean: FloatArray,
+    covariance: FloatArray,
+    boxes: FloatArray,
+    log_variance: float,
+    moved: FloatArray,
+    prior: CameraVariance,
+    c: ModelConstants,
+) -> bool:
+    """Tell whether boxes speak against a motion that pictures show: far fewer tracks have one with it.
+
+    Args:
+        mean: (N, 2, 7) predicted states of tracks that are surely real.
+        covariance: (N, 2, 7, 7).
+        boxes: (M, 4) left, top, right, bottom (px).
+        log_variance: ln ρ² of the sensor's sides.
+        moved: (N, 2) how far the motion takes each beyond what was predicted (px).
+        prior: learnt variances.
+        c: constants.
+    """
+    if len(mean) < _LEAST_WITNESSES or not len(boxes):
+        return False
+    y, _, wide, d2_size, _ = _compared(mean, covariance, boxes, log_variance, prior, c)
+    without = len(_nearest(y**2 / wide, d2_size)[0])
+    paired = len(_nearest((y - moved[:, None]) ** 2 / wide, d2_size)[0])
+    return without >= _LEAST_WITNESSES and 10 * paired < _LEAST_TENTHS * without
 
 
 def compensate(
@@ -148,6 +169,44 @@ def compensate(
     mean[:, :, GROWTH] += lasting * scale
     covariance[..., POSITION, POSITION] += np.diag(motion.covariance)[:2]
     return mean, covariance
+
+
+class _Compared(NamedTuple):
+    """Boxes (M,) against tracks (N,).
+
+    Attributes:
+        y: (N, M, 2) innovations of the centre (px).
+        S: (N, 2) their variances.
+        wide: (N, 1, 2) these with what the camera may have moved.
+        d2_size: (N, M) squared distances of the sizes.
+        scale: (N,) sizes of the tracks (px).
+    """
+
+    y: FloatArray
+    S: FloatArray
+    wide: FloatArray
+    d2_size: FloatArray
+    scale: FloatArray
+
+
+def _compared(
+    mean: FloatArray,
+    covariance: FloatArray,
+    boxes: FloatArray,
+    log_variance: float,
+    prior: CameraVariance,
+    c: ModelConstants,
+) -> _Compared:
+    size = expected_size(mean)
+    scale = np.sqrt(size.prod(axis=1))
+    R = side_variance(size, log_variance, c)
+    S = _variance_of_sum(covariance, POSITION, POSITION_ERROR) + R / 2.0
+    S_size = _variance_of_sum(covariance, LOG_SIZE, SIZE_ERROR) + 2.0 * R / size**2
+    y = (boxes[:, :2] + boxes[:, 2:])[None] / 2.0 - expected_centre(mean)[:, None]
+    y_size = np.log(boxes[:, 2:] - boxes[:, :2])[None] - np.log(size)[:, None]
+    d2_size = (y_size**2 / S_size[:, None]).sum(axis=2)
+    allowance = min(prior.shift * _PAIRING_DEVIATIONS, _PAIRING_MOST) * scale**2
+    return _Compared(y, S, (S + allowance[:, None])[:, None], d2_size, scale)
 
 
 def _variance_of_sum(covariance: FloatArray, i: int, j: int) -> FloatArray:

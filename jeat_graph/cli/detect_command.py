@@ -106,6 +106,8 @@ def _write_lines(scans: Iterable[Scan]) -> None:
         line["scores"] = np.round(scan.scores, _PLACES + 1).tolist()
         if scan.classes is not None:
             line["classes"] = scan.classes.tolist()
+        if scan.camera_motion is not None:
+            line["camera_motion"] = scan.camera_motion.tolist()
         sys.stdout.write(json.dumps(line) + "\n")
         sys.stdout.flush()
 

@@ -96,14 +96,15 @@ def add_looking(parser: argparse._ActionsContainer) -> None:
         "--detection-config",
         metavar="FILE",
         help="YAML with settings of the detectors (sections frames, events, model_frames, model_events, "
-        "model_fused)",
+        "model_fused, camera)",
     )
     add(
         "--detection-set",
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="change one of these settings, say model_frames.layout=yolov8; may be given many times",
+        help="change one of these settings, say model_frames.layout=yolov8, or camera.follow=false for boxes "
+        "without the camera's own motion; may be given many times",
     )
     add(
         "--mask",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
+from jeat_graph.data.camera_motion import CAMERA_MOTION
 from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR
 from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.interop import boxes_of
@@ -36,6 +37,9 @@ class DetectionViews:
         def embedding_rows(self) -> EmbeddingArray | None:
             """What each row of `to_rows` looks like."""
 
+        def motion_rows(self) -> FloatArray | None:
+            """The camera's motion in the first of each scan's rows."""
+
         @staticmethod
         def from_rows(*columns: Any) -> Detections:
             """Group rows into scans."""
@@ -51,12 +55,14 @@ class DetectionViews:
         columns = self.columns()
         if "embedding" in columns:
             columns["embedding"] = list(columns["embedding"])
+        if CAMERA_MOTION in columns:
+            columns[CAMERA_MOTION] = [None if np.isnan(one[0]) else one for one in columns[CAMERA_MOTION]]
         return pd.DataFrame(columns)
 
     def columns(self) -> dict[str, Any]:
         """Return the columns of `detections.csv` by name, one row a detection or empty scan.
 
-        Embeddings, if there are any, are one array (N, E).
+        Embeddings, if there are any, are one array (N, E), and motions of cameras one of (N, 11).
         """
         t, sensor, boxes, scores, _, classes = self.to_rows()
         columns: dict[str, Any] = {"t": t, "sensor": sensor}
@@ -67,6 +73,9 @@ class DetectionViews:
         looks = self.embedding_rows()
         if looks is not None:
             columns["embedding"] = looks
+        motions = self.motion_rows()
+        if motions is not None:
+            columns[CAMERA_MOTION] = motions
         return columns
 
     @classmethod
@@ -79,8 +88,9 @@ class DetectionViews:
             frame: one row a detection, with the columns and other names that files may have: `t` (s, dates or
                 spans of time) or frame numbers; `left, top, width, height`, or `left, top, right, bottom`, or
                 `x1, y1, x2, y2` and so on (px); `score` (1 where there is no such column), `sensor`, `class`
-                and `embedding` (an array of numbers each) where there are such. A row without a box is a scan
-                that found nothing; a box without area is left out, and counted in `dropped`.
+                and `embedding` (an array of numbers each) where there are such, `camera_motion` too. A row
+                without a box is a scan that found nothing; a box without area is left out, and counted in
+                `dropped`.
             sensor: name of the sensor where the frame has no such column.
             options: what the frame does not say itself, as `tables.reading.Reading` has it.
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.boxes import class_texts, find_bad_row
+from jeat_graph.data.camera_motion import bad_motions, join_motions, motions_of_scans, rows_of_motions
 from jeat_graph.data.class_columns import rows_of_class
 from jeat_graph.data.detection_views import DetectionViews
 from jeat_graph.data.embeddings import EmbeddingArray, join_embeddings, spread_embeddings, unit_embeddings
@@ -35,6 +36,7 @@ class Detections(DetectionViews):
         classes: (N,) class names (empty text where unknown), or None if no class is known.
         dropped: boxes without area that a reader has left out; their scans are there.
         embeddings: (N, E) what each looks like, of unit length; NaN where unknown; or None.
+        camera_motion: (K, 11) how the camera moved before each scan, NaN where unknown; or None.
     """
 
     sensors: tuple[str, ...]
@@ -46,6 +48,7 @@ class Detections(DetectionViews):
     classes: TextArray | None = None
     dropped: int = 0
     embeddings: EmbeddingArray | None = None
+    camera_motion: FloatArray | None = None
 
     @staticmethod
     def from_rows(
@@ -56,6 +59,7 @@ class Detections(DetectionViews):
         empty: npt.ArrayLike | None = None,
         classes: Sequence[str] | TextArray | None = None,
         embeddings: npt.ArrayLike | None = None,
+        camera_motion: FloatArray | None = None,
     ) -> Detections:
         """Group rows, in any order, into scans. Rows of one scan keep their order.
 
@@ -67,6 +71,8 @@ class Detections(DetectionViews):
             empty: (R,) true where the row only says that the scan took place; none by default.
             classes: (R,) class of each row, optional.
             embeddings: (R, E) what each row looks like, NaN where that is not known, optional.
+            camera_motion: (R, 11) in one row of each scan that knows it (see `camera_motion`), NaN in the
+                others, optional.
 
         Raises:
             DataError: a time, a box or an embedding that is not valid; the message names the row.
@@ -91,7 +97,11 @@ class Detections(DetectionViews):
         sensors, code = np.unique(names, return_inverse=True)
         kinds = None if classes is None else class_texts(classes, len(time)).copy()
         looks = None if embeddings is None else unit_embeddings(embeddings, len(time))
-        return Detections.from_checked(time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap, looks)
+        if camera_motion is not None and bad_motions(camera_motion).any():
+            raise DataError(f"row {int(np.argmax(bad_motions(camera_motion)))}: camera_motion is none")
+        return Detections.from_checked(
+            time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap, looks, camera_motion
+        )
 
     @staticmethod
     def from_checked(
@@ -101,6 +111,7 @@ class Detections(DetectionViews):
         found: tuple[FloatArray, FloatArray, TextArray | None],
         empty: BoolArray,
         embeddings: EmbeddingArray | None = None,
+        camera_motion: FloatArray | None = None,
     ) -> Detections:
         """Group rows that are known to be good, as `from_rows`; their arrays may become the detections' own.
 
@@ -111,6 +122,7 @@ class Detections(DetectionViews):
             found: boxes (R, 4), scores (R,), and classes (R,) or None.
             empty: (R,) true where the row only says that the scan took place.
             embeddings: (R, E) what each row looks like, or None.
+            camera_motion: (R, 11) in one row of each scan that knows it, NaN in the others; or None.
         """
         groups = group_rows(t, code, empty)
         boxes, scores, classes = found
@@ -124,6 +136,7 @@ class Detections(DetectionViews):
             scores=np.ascontiguousarray(scores[rows]),
             classes=None if classes is None else classes[rows],
             embeddings=None if embeddings is None else embeddings[rows],
+            camera_motion=motions_of_scans(camera_motion, groups.scan, len(groups.first)),
         )
 
     @staticmethod
@@ -136,6 +149,7 @@ class Detections(DetectionViews):
             (rows.boxes, rows.scores, rows.classes),
             rows.empty,
             rows.embeddings,
+            rows.camera_motion,
         )
         return replace(found, dropped=rows.dropped)
 
@@ -155,6 +169,7 @@ class Detections(DetectionViews):
             empty=np.repeat([len(scan) == 0 for scan in items], rows),
             classes=_classes_of_rows(items),
             embeddings=join_embeddings([scan.embeddings for scan in items], rows),
+            camera_motion=rows_of_motions([scan.camera_motion for scan in items], np.array(rows)),
         )
 
     @staticmethod
@@ -171,6 +186,7 @@ class Detections(DetectionViews):
         whole = Detections.from_rows(
             *(t, sensor, boxes, scores, empty, classes if has_class else None),
             join_embeddings(looks, [len(t) for t, *_ in rows]),
+            join_motions([part.motion_rows() for part in parts], [len(t) for t, *_ in rows]),
         )
         return replace(whole, dropped=sum(part.dropped for part in parts))
 
@@ -203,6 +219,10 @@ class Detections(DetectionViews):
         count = np.diff(self.scan_start)
         return spread_embeddings(self.embeddings, np.repeat(count > 0, np.maximum(count, 1)))
 
+    def motion_rows(self) -> FloatArray | None:
+        """Return the camera's motions (R, 11) in the first of each scan's rows of `to_rows`; or None."""
+        return rows_of_motions(self.camera_motion, np.maximum(np.diff(self.scan_start), 1))
+
     @property
     def num_scans(self) -> int:
         """Number of scans K, the empty ones included."""
@@ -221,7 +241,12 @@ class Detections(DetectionViews):
             self.scores[rows],
             None if self.classes is None else self.classes[rows],
             None if self.embeddings is None else self.embeddings[rows],
+            self._motion_of(k),
         )
+
+    def _motion_of(self, k: int) -> FloatArray | None:
+        motion = None if self.camera_motion is None else self.camera_motion[k]
+        return None if motion is None or np.isnan(motion[0]) else motion
 
     def sensor_times(self, sensor: str) -> FloatArray:
         """Times of one sensor's scans (s), not decreasing."""

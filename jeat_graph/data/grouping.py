@@ -16,11 +16,13 @@ class Groups(NamedTuple):
         first: (K,) a row of each scan.
         start: (K + 1,) scan k owns `rows[start[k]:start[k + 1]]`.
         rows: (N,) the rows with boxes, scan by scan; None where that is all rows, as they are.
+        scan: (R,) the scan of each row.
     """
 
     first: IntArray
     start: IntArray
     rows: IntArray | None
+    scan: IntArray
 
 
 def group_rows(time: FloatArray, code: IntArray, empty: BoolArray) -> Groups:
@@ -42,7 +44,10 @@ def group_rows(time: FloatArray, code: IntArray, empty: BoolArray) -> Groups:
     begin = np.flatnonzero(begins)
     ends = np.append(begin, len(time)).astype(np.int64)
     first = begin if order is None else order[begin]
+    scan = np.cumsum(begins, dtype=np.int64) - 1
+    if order is not None:
+        scan[order] = scan.copy()
     if not empty.any():
-        return Groups(first, ends, order)
+        return Groups(first, ends, order, scan)
     kept = np.flatnonzero(~empty)
-    return Groups(first, np.searchsorted(kept, ends), kept if order is None else order[kept])
+    return Groups(first, np.searchsorted(kept, ends), kept if order is None else order[kept], scan)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, TextArray
 from jeat_graph.data.boxes import check_boxes, class_texts, without_area
+from jeat_graph.data.camera_motion import motion_of
 from jeat_graph.data.embeddings import EmbeddingArray, unit_embeddings
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.interop import from_xyxy
@@ -33,9 +34,10 @@ class Scan:
         scores: (M,) confidence in [0, 1].
         classes: (M,) class names, empty text where unknown, or None.
         embeddings: (M, E) what each looks like, of unit length (float32); NaN where unknown; or None.
+        camera_motion: (11,) how the camera moved since its picture before (see `camera_motion`), or None.
 
     Raises:
-        DataError: if any value is not valid (see `check_boxes`, `unit_embeddings`).
+        DataError: if any value is not valid (see `check_boxes`, `unit_embeddings`, `motion_of`).
     """
 
     t: float
@@ -44,6 +46,7 @@ class Scan:
     scores: FloatArray
     classes: TextArray | None = None
     embeddings: EmbeddingArray | None = None
+    camera_motion: FloatArray | None = None
 
     def __post_init__(self) -> None:
         t = time_of(self.t)
@@ -57,6 +60,8 @@ class Scan:
             object.__setattr__(self, "classes", class_texts(self.classes, len(scores)))
         if self.embeddings is not None:
             object.__setattr__(self, "embeddings", unit_embeddings(self.embeddings, len(scores)))
+        if self.camera_motion is not None:
+            object.__setattr__(self, "camera_motion", motion_of(self.camera_motion))
 
     def __len__(self) -> int:
         return len(self.scores)
@@ -98,6 +103,7 @@ def scan_with_area(
     scores: npt.ArrayLike,
     classes: npt.ArrayLike | None = None,
     embeddings: npt.ArrayLike | None = None,
+    camera_motion: npt.ArrayLike | None = None,
 ) -> tuple[Scan, int]:
     """Make a scan of what a detector gave, which may have clipped boxes to nothing.
 
@@ -108,6 +114,7 @@ def scan_with_area(
         scores: (M,) confidence in [0, 1]; that of a box without area is not looked at.
         classes: (M,) class names, or None.
         embeddings: (M, E), or None.
+        camera_motion: (11,), or None.
 
     Returns:
         The scan without the boxes that have no area, and how many these were.
@@ -123,7 +130,9 @@ def scan_with_area(
             columns[0], flat = table, without_area(table)
         if flat.any() and all(one is None or len(one) == len(flat) for one in columns):
             columns = [None if one is None else np.asarray(one)[~flat] for one in columns]
-    return Scan(t, sensor, *columns), int(flat.sum())
+    motion = None if camera_motion is None else motion_of(camera_motion)
+    made = Scan(t, sensor, columns[0], columns[1], columns[2], columns[3], motion)
+    return made, int(flat.sum())
 
 
 def trusted_scan(
@@ -133,10 +142,12 @@ def trusted_scan(
     scores: FloatArray,
     classes: TextArray | None,
     embeddings: EmbeddingArray | None,
+    camera_motion: FloatArray | None,
 ) -> Scan:
     """Make a scan of arrays that were checked already, without checking them again."""
     scan = object.__new__(Scan)
-    values = {"t": t, "sensor": sensor, "boxes": boxes, "scores": scores}
-    for name, value in (values | {"classes": classes, "embeddings": embeddings}).items():
+    values: dict[str, Any] = {"t": t, "sensor": sensor, "boxes": boxes, "scores": scores}
+    values |= {"classes": classes, "embeddings": embeddings, "camera_motion": camera_motion}
+    for name, value in values.items():
         object.__setattr__(scan, name, value)
     return scan

@@ -18,6 +18,7 @@ from jeat_graph.detection.ahead import Ahead
 from jeat_graph.detection.automatic import resolved
 from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.burnt_in import find_clock
+from jeat_graph.detection.camera_flow import CameraFlow
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.frame_source import frames_of
 from jeat_graph.detection.masks import MaskedPicture
@@ -170,7 +171,8 @@ def _picture_scans(
         network = network_file(request.detector_frames, FRAMES)
         model = ModelPictureDetector(network, FRAMES_SENSOR, request.settings.model_frames)
         say(model.description)
-        found = (model(frame, t) for t, frame in with_progress(source, len(source)))
+        flow = CameraFlow(request.settings.camera)
+        found = (flow(frame, model(frame, t)) for t, frame in with_progress(source, len(source)))
         return _with_note(found, model.note, say)
     stack.enter_context(one_thread())
     return _moving(source, request, _quiet_parts(source, request, say))
@@ -239,7 +241,8 @@ def _fused_scans(
         assert source is not None
         detector = FusedDetector(network, source.size_px, FUSED_SENSOR, *settings)
         say(detector.description)
-        found = (detector.look_at(frame, t) for t, frame in with_progress(source, len(source)))
+        flow = CameraFlow(request.settings.camera)
+        found = (flow(frame, detector.look_at(frame, t)) for t, frame in with_progress(source, len(source)))
         return _with_note(found, detector.note, say)
     reader, size_px = recording
     pictures = () if source is None else with_progress(source, len(source))

@@ -12,6 +12,7 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.detection.automatic import LOOK_S, PICTURES, chosen_by
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.burnt_in import find_clock
+from jeat_graph.detection.camera_flow import CameraFlow
 from jeat_graph.detection.detecting import CLOCK_S, EVENTS_SENSOR, FRAMES_SENSOR, event_detector
 from jeat_graph.detection.named import AUTO, FRAMES, MOTION, network_file
 from jeat_graph.detection.picture_detector import PictureDetector
@@ -109,8 +110,9 @@ class PictureWorker(Worker[LivePicture]):
         network = network_file(self.detector, FRAMES)
         model = ModelPictureDetector(network, self.sensor, self._request.settings.model_frames)
         self._say(model.description)
+        flow = CameraFlow(self._request.settings.camera)
         for picture in pictures:
-            yield self._masked(model(picture.frame, picture.t))
+            yield self._masked(flow(picture.frame, model(picture.frame, picture.t)))
         if model.note():
             self._say(model.note())
 

@@ -77,7 +77,7 @@ class MaskedPicture:
         if keep.all():
             return scan
         classes = None if scan.classes is None else scan.classes[keep]
-        return Scan(scan.t, scan.sensor, scan.boxes[keep], scan.scores[keep], classes)
+        return replace(scan, boxes=scan.boxes[keep], scores=scan.scores[keep], classes=classes)
 
     def keep(self, boxes: FloatArray) -> BoolArray:
         """Return which boxes (M, 4: left, top, width, height, px) do not lie mostly in a mask."""

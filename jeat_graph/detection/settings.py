@@ -1,4 +1,4 @@
-"""Settings of detectors, from YAML: `frames`, `events`, and of networks `model_frames` and its like."""
+"""Settings of detectors, from YAML: `frames`, `events`, of networks `model_frames` and its like, `camera`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from jeat_graph.config.fields import Section, number
 from jeat_graph.config.section_tree import build, merge, read_tree, tree_of_changes
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.background import BackgroundSettings
+from jeat_graph.detection.camera_flow import CameraSettings
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.noise import NoiseSettings
 
@@ -164,6 +165,7 @@ class DetectionSettings:
     model_frames: ModelSettings = field(default_factory=ModelSettings)
     model_events: ModelSettings = field(default_factory=ModelSettings)
     model_fused: ModelSettings = field(default_factory=ModelSettings)
+    camera: CameraSettings = field(default_factory=CameraSettings)
 
 
 def load_settings(path: str | Path | None = None, changes: Sequence[str] = ()) -> DetectionSettings:

@@ -12,6 +12,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.config.section_tree import build, plain
 from jeat_graph.config.sensors import ClockConfig, SensorConfig
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.camera_motion import scaled_motion
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.picture_map import PictureMap
@@ -76,7 +77,7 @@ class CommonPicture:
     def boxes(self, scan: Scan) -> Scan:
         """Bring the boxes of one scan, and leave its time."""
         way = self.ways.get(scan.sensor)
-        if way is None or way.picture is None or not len(scan):
+        if way is None or way.picture is None or (not len(scan) and scan.camera_motion is None):
             return scan
         boxes, seen = way.picture.boxes(scan.boxes)
         self.lost += int((~seen).sum())
@@ -87,6 +88,7 @@ class CommonPicture:
             scan.scores[seen],
             None if scan.classes is None else scan.classes[seen],
             None if scan.embeddings is None else scan.embeddings[seen],
+            None if scan.camera_motion is None else _motion_in(way.picture, scan.camera_motion),
         )
 
     def detections(self, detections: Detections) -> Detections:
@@ -105,8 +107,19 @@ class CommonPicture:
                 rows = np.flatnonzero(of_row == code)
                 boxes[rows], seen[rows] = way.picture.boxes(boxes[rows])
         self.lost += int((~seen).sum())
-        moved = replace(detections, boxes=boxes).where(seen)
+        moved = replace(detections, boxes=boxes, camera_motion=self._motions(detections)).where(seen)
         return moved if np.array_equal(t, detections.scan_t) else at_times(moved, t)
+
+    def _motions(self, detections: Detections) -> FloatArray | None:
+        """Return the cameras' motions (K, 11) in the common picture."""
+        if detections.camera_motion is None:
+            return None
+        motions = detections.camera_motion.copy()
+        for k in np.flatnonzero(~np.isnan(motions[:, 0])):
+            way = self.ways.get(detections.sensors[detections.scan_sensor[k]], _NO_WAY)
+            if way.picture is not None:
+                motions[k] = _motion_in(way.picture, motions[k])
+        return motions
 
 
 # What a sensor's configuration says of its way.
@@ -208,6 +221,15 @@ def by_recorded_ways(detections: Detections, config: Config, ways: Mapping[str, 
         sensor = build(SensorConfig, {"rate_hz": sensors[name].rate_hz, **one}, f"ways.{name}.")
         sensors[name] = replace(sensors[name], **{key: getattr(sensor, key) for key in _WAY_KEYS})
     return CommonPicture.of(replace(config, sensors=sensors)).detections(detections)
+
+
+def _motion_in(picture: PictureMap, motion: FloatArray) -> FloatArray:
+    """Return a camera's motion (11,) in the common picture: as a small box about its centre goes there."""
+    x, y = motion[1:3]
+    corner = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) + np.array([x - 0.5, y - 0.5])
+    boxes, _ = picture.boxes(np.concatenate([corner, np.ones((3, 2))], axis=1))
+    place, right, down = boxes[:, :2] + boxes[:, 2:] / 2.0
+    return scaled_motion(motion, place, np.stack([right - place, down - place], axis=1))
 
 
 def _way(name: str, sensor: SensorConfig, config: Config) -> Way:

@@ -13,6 +13,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.road.box_rows import BoxConfig, rows_of_log
 from jeat_graph.road.boxes_road import TrackBoxes, each_track
 from jeat_graph.road.camera import RoadCamera
+from jeat_graph.road.sway import steadied
 
 _SAME_TRACK = 0.5  # share of a fragment's detections that lie on a track for it to be a part of it
 _FEW = 3  # fewer detections in a row that lie beside their track's boxes are errors, not another's
@@ -28,6 +29,7 @@ def boxes_of_log(
     identity belong to the track on whose boxes they lie, at times at which the track has none of its own.
     """
     sensors = int(log["sensor"].max(initial=-1)) + 1
+    log = steadied(log)
     log = log[np.argsort(log["track_id"], kind="stable")]
     pieces = np.split(log, np.flatnonzero(np.diff(log["track_id"])) + 1) if len(log) else []
     tracks = {int(one.track_id[0]): one for one in each_track(table)}

@@ -196,5 +196,5 @@ def _ascending(ids: Any) -> bool:
 def _check_labels(model: dict[str, Any], classes: int) -> None:
     """Refuse numbers of classes that are not there."""
     for name in ("histories.label", "final.label"):
-        if len(model[name]) and int(model[name].max()) >= classes:
+        if len(model[name]) and not -1 <= int(model[name].min()) <= int(model[name].max()) < classes:
             raise DataError("is damaged: classes are missing")

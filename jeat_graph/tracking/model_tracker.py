@@ -65,6 +65,12 @@ class PendingStep(NamedTuple):
     given: IntArray | None = None
 
 
+def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
+    """Return the camera's motion (11,) of the scan that knows it best; None if none does."""
+    told = [scan.camera_motion for scan in batch if scan.camera_motion is not None]
+    return min(told, key=lambda one: float(one[7] + one[8])) if told else None
+
+
 class ModelTracker(Updates, SavedModel):
     """The model as a tracker.
 
@@ -213,7 +219,7 @@ class ModelTracker(Updates, SavedModel):
         sides = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1)
         compared = None if embeddings is None else self._compare(embeddings, sensor)
         alike = None if compared is None else np.ascontiguousarray(compared.log_ratio[:, order])
-        self._model.take(t, looking, numbers, sides, logit(scores), alike)
+        self._model.take(t, looking, numbers, sides, logit(scores), alike, _surest_motion(batch))
         self._order, self._causal = order, None
         if self._diagnostics:
             self._boxes = StepBoxes(t, sensor[order], boxes)

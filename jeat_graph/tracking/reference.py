@@ -1,7 +1,7 @@
 """The reference tracker's step in NumPy: the definition of the model, as the method's page has it.
 
-predict → correct boxes → follow the camera → associate → update → hits and misses → births → compare sensors
-→ posterior → learn → report → end.
+predict → correct boxes → follow the picture → follow the camera → associate → update → hits and misses
+→ births → compare sensors → posterior → learn → report → end.
 
 Every stage has what it reads and writes in its name and in `ReferenceState`; the formulas are in the modules
 of `filters` and `association` that it calls. Scans of one time are taken one after the other, the sensor with
@@ -25,6 +25,7 @@ from jeat_graph.filters import (
     evidence,
     gap_survival,
     noise_learning,
+    picture_motion,
     score_calibration,
     sensor_offsets,
     singer,
@@ -32,6 +33,7 @@ from jeat_graph.filters import (
 )
 from jeat_graph.filters.evidence import ScanClock
 from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.picture_motion import PictureMotion
 from jeat_graph.filters.visibility import VISIBLE
 from jeat_graph.smoothers.state_rts import FilterRecord
 from jeat_graph.tracking.reference_life import (
@@ -97,8 +99,23 @@ class Reported(NamedTuple):
     noise_scale: list[float]
 
 
-def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelConstants) -> Reported:
-    """Take in all scans of one time (s), at most one of each sensor."""
+def step(
+    state: ReferenceState,
+    t: float,
+    scans: Sequence[SensorScan],
+    c: ModelConstants,
+    motion: PictureMotion | None = None,
+) -> Reported:
+    """Take in all scans of one time (s), at most one of each sensor.
+
+    Args:
+        state: changed.
+        t: time (s).
+        scans: of that time.
+        c: constants.
+        motion: of the camera since its picture before, where there is one of that time.
+    """
+    step_s = t if state.t is None else state.t
     state.tracks = replace(state.tracks, used=np.zeros_like(state.tracks.used))
     takers, records = [np.zeros(0, dtype=np.int64) for _ in scans], []
     nis, noise_scale = [np.full(len(scan.boxes), np.nan) for scan in scans], [1.0 for _ in scans]
@@ -108,6 +125,7 @@ def step(state: ReferenceState, t: float, scans: Sequence[SensorScan], c: ModelC
         dt = 0.0 if state.t is None else t - state.t
         transition = predict(state, t, c)
         scan = correct_boxes(state, given, c)
+        follow_picture(state, scan, motion, step_s, c)
         follow_camera(state, scan, dt, c)
         before = state.tracks
         noise_scale[place] = math.exp(state.log_side_variance[given.sensor]) / c.side_std**2
@@ -171,7 +189,9 @@ def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
     F = singer.in_perspective(model.F, tracks.mean, dt, c)
     if dt > 0.0 and len(tracks):
         noise = state.process_noise, state.log_scene_variance
-        mean, covariance = singer.predict(tracks.mean, tracks.covariance, model, F, *noise, c)
+        own, moves = picture_motion.before_prediction(tracks.mean, state.camera_velocity)
+        mean, covariance = singer.predict(own, tracks.covariance, model, F, *noise, c)
+        mean = picture_motion.after_prediction(mean, moves, state.camera_velocity, dt)
         presence = visibility.predict(tracks.presence, dt, c)
         state.tracks = replace(tracks, mean=mean, covariance=covariance, presence=presence)
     return F
@@ -189,14 +209,46 @@ def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) ->
     return scan._replace(boxes=sensor_offsets.corrected(scan.boxes, offset), edges=edges)
 
 
+def follow_picture(
+    state: ReferenceState,
+    scan: SensorScan,
+    motion: PictureMotion | None,
+    step_s: float,
+    c: ModelConstants,
+) -> None:
+    """Take tracks, last predicted to `step_s` (s), along with the camera, with the first scan of a time.
+
+    A motion that the scan's boxes speak against is none.
+    """
+    t, camera = state.time, state.camera_velocity.at(state.time)
+    state.camera_velocity = camera
+    if motion is None or t <= camera.picture_s:
+        return
+    tracks, sure = state.tracks, surely_there(state, c)
+    mean, covariance, velocity = picture_motion.follow(
+        tracks.mean, tracks.covariance, tracks.evidence.last_s, motion, camera, (step_s, t)
+    )
+    moved = (mean - tracks.mean)[sure, :, singer.POSITION]
+    seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
+    noise = float(state.log_side_variance[scan.sensor])
+    if not camera_motion.contradicted(*seen, noise, moved, state.camera, c):
+        state.tracks, state.camera_velocity = replace(tracks, mean=mean, covariance=covariance), velocity
+
+
+def surely_there(state: ReferenceState, c: ModelConstants) -> BoolArray:
+    """Return which tracks (N,) show the camera's motion."""
+    tracks = state.tracks
+    recent = state.time - tracks.evidence.last_s < _CAMERA_AGE_S
+    return np.asarray((tracks.real > c.report) & (tracks.evidence.detections > _CAMERA_DETECTIONS) & recent)
+
+
 def follow_camera(state: ReferenceState, scan: SensorScan, dt: float, c: ModelConstants) -> None:
     """Estimate what shift and scale all tracks have in common over `dt` seconds, and take them along."""
     dt = singer.whole_microseconds(dt)
     if dt <= 0.0:
         return
     tracks, noise = state.tracks, float(state.log_side_variance[scan.sensor])
-    recent = state.time - tracks.evidence.last_s < _CAMERA_AGE_S
-    sure = (tracks.real > c.report) & (tracks.evidence.detections > _CAMERA_DETECTIONS) & recent
+    sure = surely_there(state, c)
     seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
     motion, state.camera = camera_motion.estimate(*seen, noise, state.picture, dt, state.camera, c)
     if motion is not None:

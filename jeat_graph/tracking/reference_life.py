@@ -10,6 +10,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import box_sides, gap_survival, object_probability, sensor_offsets
 from jeat_graph.filters.evidence import Evidence, ScanClock
 from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.picture_motion import CameraVelocity, with_velocity
 from jeat_graph.filters.singer import VELOCITY
 from jeat_graph.filters.visibility import GONE
 from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks, SensorScan
@@ -39,7 +40,9 @@ def begin_tracks(
     evidence = Evidence.of_births(clock.t, scan.sensor, state.num_sensors, logits, overlap, clock.weight)
     noise = float(state.log_side_variance[scan.sensor]), state.log_scene_variance
     ids = np.arange(state.next_id, state.next_id + len(free), dtype=np.int64)
-    new = ReferenceTracks.begun(ids, *box_sides.initial_state(boxes, scan.edges[free], *noise, c), evidence)
+    mean, covariance = box_sides.initial_state(boxes, scan.edges[free], *noise, c)
+    mean = with_velocity(mean, state.camera_velocity)
+    new = ReferenceTracks.begun(ids, mean, covariance, evidence)
     state.tracks, state.next_id = tracks.append(new), state.next_id + len(free)
 
 
@@ -133,6 +136,7 @@ def begin_anew(state: ReferenceState, t: float, c: ModelConstants) -> None:
     period = np.where(np.isnan(state.period_s), c.first_period_s, state.period_s)
     state.last_look_s = t - np.clip(state.t - state.last_look_s, period, _LONGEST_AGO_S)
     state.learnt_s = t - min(max(state.t - state.learnt_s, 0.0), _LONGEST_AGO_S)
+    state.camera_velocity = CameraVelocity.none()
     state.t = None
 
 

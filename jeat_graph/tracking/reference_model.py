@@ -12,6 +12,7 @@ import numpy as np
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import gap_survival, sensor_offsets
 from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.picture_motion import PictureMotion
 from jeat_graph.filters.singer import MOTION, STATES, told_motion
 from jeat_graph.smoothers.state_rts import FilterRecord, smooth
 from jeat_graph.tracking.reference import step
@@ -117,6 +118,7 @@ class ReferenceModel:
         boxes: FloatArray,
         logits: FloatArray,
         alike: FloatArray | None = None,
+        motion: FloatArray | None = None,
     ) -> None:
         """Take in the scans of one time.
 
@@ -128,11 +130,12 @@ class ReferenceModel:
             logits: (M,) of their scores.
             alike: (N, M) how much more likely each box is of a living track than of another by what both look
                 like, as ln of the ratio.
+            motion: (11,) of the camera since its picture before, as `PictureMotion` has it.
         """
         ends = np.cumsum(numbers)
         if self._state.t is not None and t - self._state.t >= _LONGEST_SILENCE_S:
             begin_anew(self._state, t, self.constants)
-            alike = None
+            alike = motion = None
         scans = [
             SensorScan(
                 int(k),
@@ -142,7 +145,8 @@ class ReferenceModel:
             )
             for k, n, end in zip(sensors, numbers, ends, strict=True)
         ]
-        done = step(self._state, t, scans, self.constants)
+        moved = None if motion is None else PictureMotion.of_numbers(motion)
+        done = step(self._state, t, scans, self.constants, moved)
         told, tracks = done.tracks.take(done.reported), done.tracks
         scale = [np.full(len(one), value) for one, value in zip(done.nis, done.noise_scale, strict=True)]
         nothing = np.zeros(0)

@@ -24,6 +24,7 @@ from jeat_graph.filters.evidence import Evidence
 from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.object_probability import SensorBelief
+from jeat_graph.filters.picture_motion import CameraVelocity
 from jeat_graph.filters.score_calibration import RepeatCounts
 from jeat_graph.filters.sensor_offsets import OffsetSums
 from jeat_graph.filters.singer import STATES, ProcessNoise
@@ -134,6 +135,7 @@ class ReferenceState:
         picture_known: whether it is.
         process_noise: of the scene. `learn_noise`
         camera: variances of the camera's motion. `follow_camera`
+        camera_velocity: its velocity as the last picture showed it. `follow_picture`
         gaps: how gaps ended. `count_gaps`, and `end_tracks` for those that never end
         sensors: what is believed of each. `learn`; indifference points: `look`
         ended: evidence of the last tracks that ended. `end_tracks`
@@ -157,6 +159,7 @@ class ReferenceState:
     picture_known: bool
     process_noise: ProcessNoise
     camera: CameraVariance
+    camera_velocity: CameraVelocity
     gaps: GapCounts
     sensors: SensorBelief
     ended: Evidence
@@ -200,6 +203,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         picture_known=picture is not None,
         process_noise=singer.initial_process_noise(c),
         camera=camera_motion.initial_variance(c),
+        camera_velocity=CameraVelocity.none(),
         gaps=gap_survival.no_gaps(),
         sensors=SensorBelief(none, none, none, none, none, c.noise_share),
         ended=Evidence.none(0),

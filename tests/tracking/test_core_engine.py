@@ -21,7 +21,7 @@ from jeat_graph.tracking.reference_model import ReferenceModel
 _RELATIVE = 1e-8
 
 
-def drawn_stream(seed, sensors, times):
+def drawn_stream(seed, sensors, times, motions=False):
     """Scans of any sensors: objects that move, clutter, second boxes, empty scans, a camera that shakes."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(0, 25))
@@ -53,7 +53,15 @@ def drawn_stream(seed, sensors, times):
             numbers.append(len(one))
         together = np.concatenate([*boxes, np.zeros((0, 4))])
         logits = rng.normal(1, 2, len(together))
-        yield float(t), looking.astype(np.int64), np.array(numbers, dtype=np.int64), together, logits
+        scan = float(t), looking.astype(np.int64), np.array(numbers, dtype=np.int64), together, logits
+        if not motions:
+            yield scan
+            continue
+        motion = np.concatenate(
+            [[1.5 / rate], rng.uniform(0, 1500, 2), rng.normal(0, 6, 2), rng.normal(0, 0.01, 2)]
+        )
+        motion = np.concatenate([motion, rng.uniform(0, 1, 2), rng.uniform(0, 1e-5, 2)])
+        yield *scan, None, motion if rng.random() < 0.6 else None
 
 
 def models(lag_s, known):
@@ -75,13 +83,13 @@ def assert_alike(one, other, what, atol=_RELATIVE):
 
 
 @settings(max_examples=80, deadline=None)
-@given(seed=st.integers(0, 10**6), sensors=st.integers(1, 4), known=st.booleans())
-def test_every_step_is_the_references(seed, sensors, known):
+@given(seed=st.integers(0, 10**6), sensors=st.integers(1, 4), known=st.booleans(), motions=st.booleans())
+def test_every_step_is_the_references(seed, sensors, known, motions):
     core, reference = models(-1.0, known)
     for _ in range(sensors):
         core.declare_sensor()
         reference.declare_sensor()
-    for k, scans in enumerate(drawn_stream(seed, sensors, 25)):
+    for k, scans in enumerate(drawn_stream(seed, sensors, 25, motions)):
         core.take(*scans)
         core.hand_over()
         reference.take(*scans)
@@ -97,13 +105,13 @@ def test_every_step_is_the_references(seed, sensors, known):
 
 
 @settings(max_examples=12, deadline=None)
-@given(seed=st.integers(0, 10**6))
-def test_whole_tracks_are_smoothed_as_by_the_reference(seed):
+@given(seed=st.integers(0, 10**6), motions=st.booleans())
+def test_whole_tracks_are_smoothed_as_by_the_reference(seed, motions):
     core, reference = models(np.inf, True)
     for model in (core, reference):
         model.declare_sensor()
         model.declare_sensor()
-        for scans in drawn_stream(seed, 2, 40):
+        for scans in drawn_stream(seed, 2, 40, motions):
             model.take(*scans)
             model.hand_over()
     ours, theirs = sorted_rows(core.finish()), sorted_rows(reference.finish())

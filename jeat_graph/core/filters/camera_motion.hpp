@@ -11,7 +11,7 @@ namespace jeat::filters {
 
 inline constexpr double kPairingGate = 12.0, kPairingDeviations = 9.0, kPairingMost = 0.16, kReweighting = 3.0;
 inline constexpr int kReweightings = 4;
-inline constexpr std::size_t kLeastTracks = 2;
+inline constexpr std::size_t kLeastTracks = 2, kLeastWitnesses = 3, kLeastTenths = 7;
 
 struct CameraVariance {
     double shift, scale;
@@ -84,6 +84,17 @@ inline std::vector<std::pair<std::size_t, std::size_t>> nearest_pairs(const std:
     for (std::size_t i = 0; i < tracks.size(); ++i)
         if (box_of[i] != none && track_of[box_of[i]] == i) out.emplace_back(i, box_of[i]);
     return out;
+}
+
+// Whether boxes speak against a motion that pictures show: far fewer tracks have one where it `moved` them.
+inline bool contradicted(const std::vector<CameraTrack>& tracks, const std::vector<CameraTrack>& moved,
+                         const std::vector<Sides>& boxes, const CameraVariance& prior) {
+    if (tracks.size() < kLeastWitnesses || boxes.empty()) return false;
+    const ByLeft index(boxes);
+    const double variance = std::min(prior.shift * kPairingDeviations, kPairingMost);
+    const std::size_t without = nearest_pairs(tracks, boxes, index, {}, 0.0, 0.0, variance).size();
+    const std::size_t paired = nearest_pairs(moved, boxes, index, {}, 0.0, 0.0, variance).size();
+    return without >= kLeastWitnesses && 10 * paired < kLeastTenths * without;
 }
 
 inline CameraMotion estimate_camera(const std::vector<CameraTrack>& tracks, const std::vector<Sides>& boxes,

@@ -64,13 +64,19 @@ public:
     }
 
     void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
-              const std::optional<In2<double>>& alike) {
+              const std::optional<In2<double>>& alike, const std::optional<In<double>>& motion) {
         State& state = now_.state;
         check_lengths({sensors.size(), numbers.size()});
         check_lengths({boxes.shape(0), logits.size()});
         check(boxes.shape(1) == 4, "boxes have four sides");
         if (alike) check(alike->shape(0) == state.tracks.size(), "another number of tracks is compared");
         if (alike) check_lengths({alike->shape(1), logits.size()});
+        std::optional<PictureMotion> moved;
+        if (motion) {
+            check_lengths({motion->size(), kMotionNumbers});
+            moved = PictureMotion::of(motion->data());
+            check(moved->span_s > 0.0, "a motion takes time");
+        }
         scans_.resize(sensors.size());
         std::size_t at = 0;
         for (std::size_t k = 0; k < sensors.size(); ++k) {
@@ -94,7 +100,7 @@ public:
         if (begins_anew) record_.begins_anew = true, step_.begin_anew(t);
         for (Scan& scan : scans_)
             if (begins_anew) scan.alike = {nullptr, 0, 0};
-        step_.run(t, scans_, reported_, record);
+        step_.run(t, scans_, moved && !begins_anew ? &*moved : nullptr, reported_, record);
         write_answer(t);
         step_.end_tracks(record);
     }
@@ -291,9 +297,11 @@ void bind(nb::module_& module) {
              "NaN where it is to be learnt.")
         .def("take", &Model::take, nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
              nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("alike").noconvert() = nb::none(),
+             nb::arg("motion").noconvert() = nb::none(),
              "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
              "top, right, bottom (px), logits of their scores (M,); alike (N, M): how much more likely each box is of a\n"
-             "living track than of another by what both look like, as ln of the ratio.")
+             "living track than of another by what both look like, as ln of the ratio; motion (11,): of the camera since\n"
+             "its picture before, see jeat_graph.filters.picture_motion.PictureMotion.")
         .def("record", &Model::record, "What the last step gave the smoother; once.")
         .def("hand_over", &Model::hand_over, nb::arg("record").none() = nb::none(),
              nb::arg("given").noconvert() = nb::none(), nb::arg("label").noconvert() = nb::none(),

@@ -161,8 +161,8 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
 }
 
 template <class Visitor> void visit_state(Visitor& v, State& state) {
-    auto& [constants, tracks, t, started, next_id, width, height, picture_known, process_noise, camera, gaps, belief,
-           offsets, log_side_variance, sensors, ended, learnt_s] = state;
+    auto& [constants, tracks, t, started, next_id, width, height, picture_known, process_noise, camera, camera_velocity, gaps,
+           belief, offsets, log_side_variance, sensors, ended, learnt_s] = state;
     (void)constants;  // the caller's
     std::size_t S = sensors.size(), rows = tracks.size(), ended_rows = ended.size();
     v.whole("sensors", S);
@@ -189,6 +189,11 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     v.numbers("camera.shift", &shift, 1);
     v.numbers("camera.scale", &scale, 1);
     v.numbers("camera.last", last.data(), last.size());
+    auto& [rate, picture_s, until_s] = camera_velocity;
+    v.numbers("camera.centre", rate.centre.data(), rate.centre.size());
+    v.numbers("camera.rate", rate.theta.data(), rate.theta.size());
+    v.numbers("camera.picture_s", &picture_s, 1, Values::any);
+    v.numbers("camera.until_s", &until_s, 1, Values::any);
     auto& [gaps_ended, ended_well] = gaps;
     v.numbers("gaps.ended", gaps_ended.data(), gaps_ended.size());
     v.numbers("gaps.ended_well", ended_well.data(), ended_well.size());

@@ -15,6 +15,7 @@
 #include "filters/evidence.hpp"
 #include "filters/gap_survival.hpp"
 #include "filters/object_probability.hpp"
+#include "filters/picture_motion.hpp"
 #include "filters/score_calibration.hpp"
 #include "filters/sensor_offsets.hpp"
 #include "filters/visibility.hpp"
@@ -94,6 +95,7 @@ struct State {
     bool picture_known = false;
     ProcessNoise process_noise;     // learn_noise
     CameraVariance camera;          // follow_camera
+    CameraVelocity camera_velocity; // follow_picture
     GapCounts gaps;                 // count_gaps, end_tracks
     SensorBelief belief;            // learn
     OffsetSums offsets;             // compare_sensors

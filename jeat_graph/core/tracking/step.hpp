@@ -1,4 +1,4 @@
-// One step: predict, correct boxes, follow the camera, associate, update, hits and misses, births, compare sensors,
+// One step: predict, correct boxes, follow picture and camera, associate, update, hits and misses, births, compare sensors,
 // posterior, learn, report, end. Every stage writes what is behind its name in state.hpp; the definition, stage by
 // stage, is jeat_graph/tracking/reference.py.
 #pragma once
@@ -41,14 +41,18 @@ class Step {
 public:
     explicit Step(State& state) : s_(state), c_(state.constants) {}
 
-    // Take in all scans of one time, at most one of each sensor; `reported` is written.
-    void run(double t, std::vector<Scan>& scans, std::vector<std::uint8_t>& reported, Record* record) {
+    // Take in all scans of one time, at most one of each sensor; `motion`, if known, is that of the camera since its
+    // picture before. `reported` is written.
+    void run(double t, std::vector<Scan>& scans, const PictureMotion* motion, std::vector<std::uint8_t>& reported,
+             Record* record) {
         std::fill(s_.tracks.used.begin(), s_.tracks.used.end(), 0);
+        step_s_ = s_.started ? s_.t : t;
         for (const std::size_t place : order_of(scans)) {
             Scan& scan = scans[place];
             const ScanClock clock = look(t, scan);
             predict(t);
             correct_boxes(scan);
+            follow_picture(motion, scan);
             follow_camera(scan);
             if (record) write_predictions(*record, scan.sensor);
             associate(scan);
@@ -111,6 +115,7 @@ public:
         s_.learnt_s = t - clamp(s_.t - s_.learnt_s, 0.0, kLongestAgoS);
         s_.t = t;
         s_.started = false;
+        s_.camera_velocity = {};
     }
 
 private:
@@ -185,7 +190,9 @@ private:
         const Densities densities(s_.process_noise, exp_of(s_.log_scene_variance()));
         Tracks& tracks = s_.tracks;
         for (std::size_t i = 0; i < tracks.size(); ++i) {
-            filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, densities, c_);
+            with_camera(tracks.mean_of(i), s_.camera_velocity, dt, [&] {
+                filters::predict(tracks.mean_of(i), tracks.covariance_of(i), step_, dt, densities, c_);
+            });
             predict_presence(tracks.presence.data() + i * kPresences, presence_step_);
         }
     }
@@ -202,11 +209,34 @@ private:
         }
     }
 
-    void follow_camera(const Scan& scan) {
+    // Once a time: with its first scan. A motion that its boxes speak against is none.
+    void follow_picture(const PictureMotion* motion, const Scan& scan) {
+        CameraVelocity& camera = s_.camera_velocity;
+        camera = camera.at(s_.t);
+        if (!motion || s_.t <= camera.picture_s) return;
+        const CameraVelocity now = CameraVelocity::after(*motion, s_.t);
         Tracks& tracks = s_.tracks;
-        const double rho2 = exp_of(s_.log_side_variance[scan.sensor]), dt = static_cast<double>(ticks_) / 1e6;
-        if (ticks_ <= 0) return;  // no time, no motion
+        changes_.clear();
+        for (std::size_t i = 0; i < tracks.size(); ++i)
+            changes_.push_back(camera_change(tracks.mean_of(i), tracks.evidence.last_s[i], *motion, camera, now, step_s_));
+        see_sure_tracks(exp_of(s_.log_side_variance[scan.sensor]));
+        moved_tracks_ = camera_tracks_;
+        for (std::size_t k = 0; k < moved_tracks_.size(); ++k) {
+            const CameraChange& change = changes_[sure_rows_[k]];
+            moved_tracks_[k].x += change.rate[0] * change.elapsed;
+            moved_tracks_[k].y += change.rate[1] * change.elapsed;
+        }
+        if (contradicted(camera_tracks_, moved_tracks_, boxes_, s_.camera)) return;
+        for (std::size_t i = 0; i < tracks.size(); ++i)
+            follow(tracks.mean_of(i), tracks.covariance_of(i), changes_[i], *motion, camera, now);
+        camera = now;
+    }
+
+    // The tracks that show the camera's motion: really there, and seen lately.
+    void see_sure_tracks(double rho2) {
+        Tracks& tracks = s_.tracks;
         camera_tracks_.clear();
+        sure_rows_.clear();
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             if (!(tracks.real[i] > c_.report) || !(tracks.evidence.detections[i] > kCameraDetections) ||
                 !(unseen_for(i) < kCameraAgeS))
@@ -216,12 +246,20 @@ private:
             const double w = box.width(), h = box.height(), both = std::sqrt(w * h);
             const double Rw = side_variance(w, both, rho2, c_), Rh = side_variance(h, both, rho2, c_);
             const auto sum = [](const double* Q, int i, int j) { return Q[i * kStates + i] + 2.0 * Q[i * kStates + j] + Q[j * kStates + j]; };
+            sure_rows_.push_back(i);
             camera_tracks_.push_back({(box.left + box.right) / 2.0, (box.top + box.bottom) / 2.0, w, h, both,
                                       sum(P, kPosition, kPositionError) + Rw / 2.0,
                                       sum(P + kMatrix, kPosition, kPositionError) + Rh / 2.0,
                                       sum(P, kLogSize, kSizeError) + 2.0 * Rw / (w * w),
                                       sum(P + kMatrix, kLogSize, kSizeError) + 2.0 * Rh / (h * h)});
         }
+    }
+
+    void follow_camera(const Scan& scan) {
+        Tracks& tracks = s_.tracks;
+        const double rho2 = exp_of(s_.log_side_variance[scan.sensor]), dt = static_cast<double>(ticks_) / 1e6;
+        if (ticks_ <= 0) return;  // no time, no motion
+        see_sure_tracks(rho2);
         const CameraMotion motion = estimate_camera(camera_tracks_, boxes_, s_.width, s_.height, dt, s_.camera, c_);
         if (!motion.known) return;
         const double lasting = (1.0 - exp_of(-dt / c_.camera_time_s)) / dt;
@@ -405,6 +443,7 @@ private:
                     overlap = std::max(overlap, intersection_over_union(boxes_[j], free_boxes_[g]));
             });
             initial_state(boxes_[j], edges_[j], rho2, exp_of(s_.log_scene_variance()), c_, tracks.mean_of(row), tracks.covariance_of(row));
+            with_velocity(tracks.mean_of(row), s_.camera_velocity);
             tracks.track_id[row] = s_.next_id++;
             tracks.used[row] = std::int64_t{1} << k;
             see_presence(tracks.presence.data() + row * kPresences);
@@ -552,7 +591,10 @@ private:
     std::vector<std::uint8_t> confirms_;  // of the scan's boxes
     std::vector<std::array<double, 4>> innovations_;  // of the pairs that are made
     std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
-    std::vector<CameraTrack> camera_tracks_;
+    std::vector<CameraTrack> camera_tracks_, moved_tracks_;
+    std::vector<std::size_t> sure_rows_;
+    std::vector<CameraChange> changes_;
+    double step_s_ = 0.0;  // time of the last step (s)
     std::vector<Edges> edges_;  // of the scan's boxes
 };
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.boxes import find_bad_row, without_area
+from jeat_graph.data.camera_motion import CAMERA_MOTION, MOTION_NUMBERS, bad_motions, motion_rows
 from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR, standing_in
 from jeat_graph.data.embeddings import EmbeddingArray, find_bad_embedding, unit_embeddings
 from jeat_graph.data.errors import DataError
@@ -20,7 +21,7 @@ from jeat_graph.data.tables.reading import Reading
 
 #: Columns that a table of detections needs, or others that can stand for them, and those that it may have.
 REQUIRED = ("t", *BOX)
-OPTIONAL = ("sensor", "score", "embedding", *ASIDE)
+OPTIONAL = ("sensor", "score", "embedding", CAMERA_MOTION, *ASIDE)
 
 
 class DetectionRows(NamedTuple):
@@ -35,6 +36,7 @@ class DetectionRows(NamedTuple):
         classes: (R,) names, empty where unknown; or None.
         empty: (R,) true where a row only says that its scan took place.
         embeddings: (R, E), or None.
+        camera_motion: (R, 11), NaN in rows that say nothing of it; or None.
         dropped: rows whose box has no area; they are among the empty ones.
         first: number of the first frame where the table counts frames, else None.
     """
@@ -47,6 +49,7 @@ class DetectionRows(NamedTuple):
     classes: TextArray | None
     empty: BoolArray
     embeddings: EmbeddingArray | None
+    camera_motion: FloatArray | None
     dropped: int
     first: int | None
 
@@ -89,8 +92,9 @@ def rows_of_detections(
     looks = read_embeddings(table) if "embedding" in table else None
     flat = without_area(boxes) & ~empty
     check_rows(boxes, scores, empty | flat, table.error)
+    motions = read_motions(table) if CAMERA_MOTION in table else None
     rows = DetectionRows(
-        t, named, code, boxes, scores, classes, empty | flat, looks, int(flat.sum()), times.first
+        t, named, code, boxes, scores, classes, empty | flat, looks, motions, int(flat.sum()), times.first
     )
     fills = times.frames is not None and "sensor" not in table and not empty.any() and how.fill_empty
     return _with_frames_between(rows, times, how, table) if fills and len(t) and looks is None else rows
@@ -110,6 +114,9 @@ def _with_frames_between(rows: DetectionRows, times: Times, how: Reading, table:
         scores=np.concatenate([rows.scores, np.full(count, np.nan)]),
         classes=None if classes is None else np.concatenate([classes, np.zeros(count, dtype="U1")]),
         empty=np.concatenate([rows.empty, np.ones(count, dtype=bool)]),
+        camera_motion=None
+        if rows.camera_motion is None
+        else np.concatenate([rows.camera_motion, np.full((count, MOTION_NUMBERS), np.nan)]),
     )
 
 
@@ -121,6 +128,21 @@ def read_embeddings(table: FileTable) -> EmbeddingArray | None:
         raise table.error(bad, "embedding must be finite and not all zero")
     found = unit_embeddings(vectors, len(vectors))
     return None if np.isnan(found).all() else found
+
+
+def read_motions(table: FileTable) -> FloatArray | None:
+    """How the camera moved (R, 11) before the scans of rows; None where no row says it."""
+    vectors = table.vectors(CAMERA_MOTION)
+    try:
+        found = motion_rows(vectors)
+    except DataError as error:
+        raise table.error(int(np.argmin(np.isnan(vectors[:, 0]))), error.message) from None
+    bad = np.zeros(0, dtype=bool) if found is None else bad_motions(found)
+    if bad.any():
+        raise table.error(
+            int(np.argmax(bad)), f"{CAMERA_MOTION} is no motion: {vectors[np.argmax(bad)].tolist()}"
+        )
+    return found
 
 
 def rows_without_box(table: FileTable) -> BoolArray:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import TextArray
+from jeat_graph.data.camera_motion import CAMERA_MOTION
 from jeat_graph.data.column_names import DEFAULT_SENSOR, FRAME_COLUMNS, TIME_COLUMNS
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.scan import Scan
@@ -26,7 +27,7 @@ _TIMES = ("t", *TIME_COLUMNS, *FRAME_COLUMNS)
 _CLASSES, _CLASS_ID, _EMBEDDINGS, _VIDEO = "classes", "class_id", "embeddings", "video"
 #: Identities that another tracker has given: passed over, as they are in tables.
 _PASSED_OVER = ("tracker_id", "track_id")
-_MORE = (_CLASSES, _CLASS_ID, _EMBEDDINGS, _VIDEO)
+_MORE = (_CLASSES, _CLASS_ID, _EMBEDDINGS, CAMERA_MOTION, _VIDEO)
 
 
 def read_batches(
@@ -42,8 +43,8 @@ def read_batches(
 
     A line of JSON is one scan, `{"t": 0.05, "sensor": "rgb", "boxes": [[l, t, w, h], …], "scores": [s, …]}`,
     or a list of scans of one time. Without `scores` each is 1; `classes` (names or numbers), `class_id` and
-    `embeddings` may follow. It is given out at once; with `joint` only when a later time is seen, so that
-    scans of one time that came in lines of their own are given out together.
+    `embeddings` may follow, and `camera_motion` of the scan. It is given out at once; with `joint` only when
+    a later time is seen, so that scans of one time that came in lines of their own are given out together.
 
     CSV begins with a header and has one row a detection; a row with only `t` and `sensor` is a scan that
     found nothing. Columns and times are as in files (`column_names`). Rows of one time are given out
@@ -170,7 +171,8 @@ def _scan_of(item: Any, how: StreamReading) -> tuple[Scan, int] | None:
     boxes, scores = item["boxes"], item.get("scores")
     if scores is None:
         scores = np.ones(len(boxes) if hasattr(boxes, "__len__") else 0)
-    return how.scan(t, sensor, boxes, scores, _classes_of(item), _with_blanks(item.get(_EMBEDDINGS)))
+    looks = _with_blanks(item.get(_EMBEDDINGS))
+    return how.scan(t, sensor, boxes, scores, _classes_of(item), looks, item.get(CAMERA_MOTION))
 
 
 def _classes_of(item: dict[Any, Any]) -> dict[str, TextArray]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import TextArray
 from jeat_graph.data.box_text import KNOWN, sides_of
+from jeat_graph.data.camera_motion import CAMERA_MOTION
 from jeat_graph.data.class_columns import CLASS_COLUMNS
 from jeat_graph.data.column_names import (
     BOX,
@@ -31,7 +32,7 @@ from jeat_graph.io.streams.stream_text import decode_line
 from jeat_graph.io.tables.headers import delimiter_of
 
 _COLUMNS = ("t", "sensor", *BOX)
-_OPTIONAL = ("score", "embedding", *ASIDE)
+_OPTIONAL = ("score", "embedding", CAMERA_MOTION, *ASIDE)
 _CORNERS = ("left", "top", "right", "bottom")
 
 
@@ -42,6 +43,7 @@ class _Row(NamedTuple):
     score: float
     kinds: dict[str, str]
     look: list[float] | None
+    motion: list[float] | None
     flat: int
 
 
@@ -163,8 +165,9 @@ def _row_of(value: dict[str, str], form: CsvForm, how: StreamReading) -> _Row | 
         box = _box_of(value, form, comma)
     words = value.get("embedding", "").split()
     look = [_number("embedding", word, comma) for word in words] if words and box is not None else None
+    motion = [_number(CAMERA_MOTION, word, comma) for word in value.get(CAMERA_MOTION, "").split()] or None
     kinds = {name: value[name] for name in CLASS_COLUMNS if name in value}
-    return _Row(t, sensor, box, score, kinds, look, 0)
+    return _Row(t, sensor, box, score, kinds, look, motion, 0)
 
 
 def _box_of(value: dict[str, str], form: CsvForm, comma: bool) -> list[float]:
@@ -195,5 +198,6 @@ def _scan_of_rows(rows: list[_Row], line: int, how: StreamReading) -> ScanBatch:
     }
     numbers = next((len(row.look) for row in found if row.look is not None), 0)
     looks = [[np.nan] * numbers if row.look is None else row.look for row in found] if numbers else None
-    scan, flat = how.scan(rows[0].t, rows[0].sensor, boxes, scores, kinds, looks)
+    motion = next((row.motion for row in rows if row.motion is not None), None)
+    scan, flat = how.scan(rows[0].t, rows[0].sensor, boxes, scores, kinds, looks, motion)
     return ScanBatch([scan], [line], flat + sum(row.flat for row in rows))

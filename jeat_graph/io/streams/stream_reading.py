@@ -112,6 +112,7 @@ class StreamReading:
         scores: npt.ArrayLike,
         said: Mapping[str, TextArray],
         embeddings: npt.ArrayLike | None = None,
+        camera_motion: npt.ArrayLike | None = None,
     ) -> tuple[Scan, int]:
         """Make a scan of what its lines say.
 
@@ -122,6 +123,7 @@ class StreamReading:
             scores: (M,) on the scale of `how`.
             said: (M,) classes by the name of their column, of `class_columns.CLASS_COLUMNS`.
             embeddings: (M, E), or None.
+            camera_motion: (11,), or None.
 
         Returns:
             The scan, and how many boxes without area were left out of it.
@@ -133,7 +135,7 @@ class StreamReading:
         if self.how.score_scale != "unit":
             scores = scale_scores(np.asarray(scores, dtype=np.float64), self.how.score_scale, "")
         try:
-            found, flat = scan_with_area(t, sensor, boxes, scores, classes, embeddings)
+            found, flat = scan_with_area(t, sensor, boxes, scores, classes, embeddings, camera_motion)
         except DataError as error:
             place, wrong, rest = error.message.partition(_SCORE_IS_WRONG)
             score = _number(rest.rpartition("got ")[2]) if wrong else None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -195,6 +196,48 @@ def test_a_network_takes_the_place_of_a_detector(net, tmp_path, capsys):
     alone = ["detect", "--events", str(tmp_path / "e.raw"), "--detector-events", str(rnn), "--out", str(out)]
     assert main(alone) == 0
     assert np.diff(read_detections(out).sensor_times("evt")) == pytest.approx(0.02)
+
+
+def moved_pictures(folder, shift_px):
+    """Fifteen pictures of a street that the camera sees go to the right by so much from one to the next."""
+    import cv2
+
+    folder.mkdir()
+    rng = np.random.default_rng(0)
+    grey = cv2.GaussianBlur(rng.uniform(0, 255, (240, 480)).astype(np.float32), (0, 0), 2.0) * 3.0 - 255.0
+    for k in range(15):
+        x = 140 - shift_px * k
+        cv2.imwrite(str(folder / f"{k}.png"), np.clip(grey[:, x : x + 320], 0, 255).astype(np.uint8))
+    return ["--frames", str(folder), "--rate", "20", "--detector-frames"]
+
+
+def test_scans_of_a_network_tell_how_the_camera_moves(net, tmp_path, capsys):
+    """Whether detected and tracked in one step or two, and a line a scan; not where it is not asked for."""
+    words = [*moved_pictures(tmp_path / "pan", 4), str(net)]
+    out = tmp_path / "d.csv"
+    assert main(["detect", *words, "--out", str(out)]) == 0
+    found = read_detections(out)
+    assert np.isnan(found.camera_motion[0]).all()
+    np.testing.assert_allclose(found.camera_motion[1:, 0], 0.05)
+    np.testing.assert_allclose(found.camera_motion[1:, 3:5], np.tile([4.0, 0.0], (14, 1)), atol=0.1)
+    assert main(["track", *words, "--out", str(tmp_path / "one")]) == 0
+    assert (tmp_path / "one" / "detections.csv").read_bytes() == out.read_bytes()
+    assert main(["track", str(out), "--image", "320x240", "--out", str(tmp_path / "two")]) == 0
+    one, two = ((tmp_path / name / "causal.csv").read_bytes() for name in ("one", "two"))
+    assert one == two
+    capsys.readouterr()
+    assert main(["detect", *words, "--out", "-"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [len(line.get("camera_motion", ())) for line in lines] == [0] + [11] * 14
+    assert main(["detect", *words, "--detection-set", "camera.follow=false", "--out", str(out)]) == 0
+    assert "camera_motion" not in out.read_text()
+
+
+def test_before_a_camera_that_stands_nothing_changes(net, tmp_path):
+    words = [*moved_pictures(tmp_path / "still", 0), str(net), "--out"]
+    assert main(["detect", *words, str(tmp_path / "a.csv")]) == 0
+    assert main(["detect", *words, str(tmp_path / "b.csv"), "--detection-set", "camera.follow=false"]) == 0
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
 @pytest.mark.skipif(not MODELS.is_dir(), reason=f"{MODELS} is not there")
