@@ -45,7 +45,7 @@ def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detectio
         owner=np.array([owner]),
         born_s=np.zeros(1),
         last_s=np.ones(1),
-            confirmed_s=np.ones(1),
+        confirmed_s=np.ones(1),
     )
 
 
