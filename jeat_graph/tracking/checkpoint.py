@@ -24,7 +24,7 @@ from jeat_graph.tracking.model_measured import StepBoxes
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 31
+FORMAT = 32
 _MAGIC, _WHAT = "jeat-graph tracker", "saved tracker"
 
 

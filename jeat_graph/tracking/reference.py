@@ -42,6 +42,7 @@ from jeat_graph.tracking.reference_life import (
     compare_sensors,
     count_false_boxes,
     end_tracks,
+    is_due,
     judge,
     learn,
     report,
@@ -85,6 +86,7 @@ class Reported(NamedTuple):
     Attributes:
         tracks: (N,) the tracks after it, before any ends.
         reported: (N,) which are reported.
+        due: (N,) of which whoever confirmed them last has had the time to look again.
         takers: per scan (M,) identity of the track that took each box; every box has one.
         records: per scan, for the smoother.
         nis: per scan (M,) of `AssociatedPairs`, NaN where a box began a track.
@@ -93,6 +95,7 @@ class Reported(NamedTuple):
 
     tracks: ReferenceTracks
     reported: BoolArray
+    due: BoolArray
     takers: list[IntArray]
     records: list[FilterRecord]
     nis: list[FloatArray]
@@ -145,7 +148,7 @@ def step(
     for given, taker in zip(scans, takers, strict=True):
         count_false_boxes(state, given.sensor, taker, c)
     learn(state, t, c)
-    out = Reported(state.tracks, report(state, t, c), takers, records, nis, noise_scale)
+    out = Reported(state.tracks, report(state, t, c), is_due(state), takers, records, nis, noise_scale)
     end_tracks(state, t, c)
     return out
 

@@ -17,7 +17,7 @@ from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks,
 
 # Two times that differ by less are one (s).
 _SAME_TIME_S = 1e-6
-# Before this share of the shortest period is over no sensor has had the time to miss a track.
+# Before this share of a sensor's period is over it has not had the time to miss a track.
 _DUE = 0.9
 _LEAST_AREA = 1e-9
 # Longer ago than this is no longer told apart (s).
@@ -103,12 +103,21 @@ def report(state: ReferenceState, t: float, c: ModelConstants) -> BoolArray:
     A gap begins with the last detection that told that the track was still there.
     """
     gap = np.asarray(state.time - state.tracks.evidence.confirmed_s)
-    survival = gap_survival.survival(state.gaps, gap, c)
-    period = np.where(state.period_s > 0.0, state.period_s, np.nan)
-    due = _DUE * np.nanmin(np.append(period, np.inf))
-    survival = np.where((gap <= _SAME_TIME_S) | (gap < due), 1.0, survival)
+    survival = np.where(is_due(state), gap_survival.survival(state.gaps, gap, c), 1.0)
     inside = (share_inside(state) > c.inside_share) | (gap < _SAME_TIME_S)
     return np.asarray((state.tracks.real * survival > c.report) & inside)
+
+
+def is_due(state: ReferenceState) -> BoolArray:
+    """Return whether whoever confirmed each track (N,) last has had the time to look again.
+
+    Until then it is no gap. Of several that found it at that time the slowest one counts.
+    """
+    confirmed_s = state.tracks.evidence.confirmed_s
+    gap = state.time - confirmed_s
+    found = state.tracks.last_box_s == confirmed_s[:, None]
+    period = np.where(found & (state.period_s > 0.0), state.period_s, 0.0).max(axis=1, initial=0.0)
+    return np.asarray((gap > _SAME_TIME_S) & (gap >= _DUE * period))
 
 
 def end_tracks(state: ReferenceState, t: float, c: ModelConstants) -> None:

@@ -46,6 +46,7 @@ class Step(NamedTuple):
         real: (N,) their posterior.
         used: (N,) the sensors that found them.
         confirmed: (N,) whether a detection of that time tells that they are still there.
+        due: (N,) whether whoever confirmed them last has had the time to look again.
     """
 
     t: float
@@ -54,6 +55,7 @@ class Step(NamedTuple):
     real: FloatArray
     used: IntArray
     confirmed: BoolArray
+    due: BoolArray
 
     def track_ids(self) -> IntArray:
         """Return the identities (N,) of the tracks after it, before any ended."""
@@ -158,7 +160,7 @@ class ReferenceModel:
             (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
         )
         confirmed = tracks.evidence.confirmed_s == t
-        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used, confirmed)
+        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used, confirmed, done.due)
 
     def record(self) -> Step:
         """Return what the last step gave the smoother."""
@@ -292,7 +294,7 @@ class ReferenceModel:
             seen_next[ids[found]] = moment.t
             real = np.where(final[ids] > c.sure, np.maximum(moment.real, final[ids]), moment.real)
             nearer = np.minimum(moment.t - before[number], seen_next[ids] - moment.t)
-            real = np.where(found, real, real * gap_survival.survival(self._state.gaps, nearer, c))
+            real = np.where(~moment.due, real, real * gap_survival.survival(self._state.gaps, nearer, c))
             if number + 1 < len(steps) and steps[number + 1].t == moment.t:
                 continue  # a later step of the same time tells more
             told[int(last_records[number])] = moment, np.where(np.isinf(seen_next[ids]), 0.0, real)
@@ -348,7 +350,7 @@ def _with_sensors_of_their_time(steps: Sequence[Step]) -> list[Step]:
     """Return steps whose tracks have been found by the sensors of earlier steps of the same time as well."""
     out: list[Step] = []
     for one in steps:
-        used, confirmed = one.used, one.confirmed
+        used, confirmed, due = one.used, one.confirmed, one.due
         if out and out[-1].t == one.t:
             before = out[-1]
             lived = np.isin(before.track_id, one.track_id)
@@ -356,7 +358,7 @@ def _with_sensors_of_their_time(steps: Sequence[Step]) -> list[Step]:
             rows = np.searchsorted(one.track_id, before.track_id[lived])
             used[rows] |= before.used[lived]
             confirmed[rows] |= before.confirmed[lived]
-        out.append(one._replace(used=used, confirmed=confirmed))
+        out.append(one._replace(used=used, confirmed=confirmed, due=due & ~confirmed))
     return out
 
 

@@ -258,6 +258,23 @@ def test_a_poor_box_upon_a_better_one_keeps_no_track_reported(overlaps):
         told.append(len(made.step([(t, "rgb", boxes, np.array([0.9, 0.4 if late else 0.9]))])))
     assert min(told[10:40]) == 2
     assert told[-1] == (1 if overlaps else 2)
+    smoothed = made.finish()
+    assert int((smoothed.t > 2.82).sum()) == (3 if overlaps else 6)
+
+
+def test_a_vehicle_that_stands_has_rows_at_the_times_of_the_sensor_that_does_not_see_it():
+    made, causal = tracker(), {}
+    times = {round(0.02 * k, 6): "evt" for k in range(200)} | {
+        round(0.05 * k + 0.003, 6): "rgb" for k in range(80)
+    }
+    for t in sorted(times):
+        moving = [[500.0 + 80.0 * min(t, 1.5), 400.0, 100.0, 60.0], [900.0 - 70.0 * t, 600.0, 90.0, 60.0]]
+        seen = moving[1:] if times[t] == "evt" and t > 1.5 else moving
+        causal[t] = len(made.step([(t, times[t], np.array(seen), np.full(len(seen), 0.8))]))
+    late = [t for t in sorted(times) if 2.5 < t < 3.9]
+    assert [causal[t] for t in late] == [2] * len(late)
+    smoothed = made.finish()
+    assert [int((np.abs(smoothed.t - t) < 1e-6).sum()) for t in late] == [2] * len(late)
 
 
 def test_names_of_sensors_and_their_order_mean_nothing():

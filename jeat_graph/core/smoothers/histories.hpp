@@ -85,6 +85,7 @@ struct Entry {
     double real = 0.0;  // posterior after the step, where this was its last update
     std::int64_t used = 0;
     bool confirmed = false;  // by a detection of that time
+    bool due = false;        // whoever found it last has had the time to look again
     bool last_of_step = false;
     std::array<double, kMean> predicted_mean, mean;
     Halves predicted_covariance, covariance;
@@ -230,6 +231,7 @@ private:
             if (entries[k + 1].t == entries[k].t) {
                 entries[k + 1].used |= entries[k].used;
                 entries[k + 1].confirmed |= entries[k].confirmed;
+                entries[k + 1].due &= !entries[k + 1].confirmed;
             }
         double final_real = 0.0, next_seen = std::numeric_limits<double>::infinity();
         until_seen_.assign(n, 0.0);
@@ -249,7 +251,7 @@ private:
             double real = final_real > c.sure ? std::max(e.real, final_real) : e.real;
             if (!std::isfinite(until_seen_[given])) continue;  // not seen again
             if (given + 1 < n && entries[given + 1].t == e.t) continue;  // a later step of the same time tells more
-            if (!e.confirmed) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
+            if (e.due) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
             if (real > c.report)
                 out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used);
         }

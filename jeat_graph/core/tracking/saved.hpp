@@ -247,16 +247,16 @@ inline constexpr std::size_t kWide = 2 * smoothers::kHalf;
 struct EntryColumns {
     std::vector<double> t, dt, real, predicted_mean, mean, predicted_covariance, covariance;
     std::vector<std::int64_t> used;
-    std::vector<std::uint8_t> confirmed, last_of_step;
+    std::vector<std::uint8_t> confirmed, due, last_of_step;
 
     void reserve(std::size_t entries) {
         for (auto* one : {&predicted_mean, &mean}) one->reserve(entries * kMean);
         for (auto* one : {&predicted_covariance, &covariance}) one->reserve(entries * kWide);
     }
     void add(Entry& entry) {
-        auto& [at, since, posterior, sensors, sure, last, m0, m1, p0, p1] = entry;
+        auto& [at, since, posterior, sensors, sure, missing, last, m0, m1, p0, p1] = entry;
         t.push_back(at), dt.push_back(since), real.push_back(posterior);
-        used.push_back(sensors), confirmed.push_back(sure), last_of_step.push_back(last);
+        used.push_back(sensors), confirmed.push_back(sure), due.push_back(missing), last_of_step.push_back(last);
         predicted_mean.insert(predicted_mean.end(), m0.begin(), m0.end());
         mean.insert(mean.end(), m1.begin(), m1.end());
         predicted_covariance.insert(predicted_covariance.end(), p0.begin(), p0.end());
@@ -265,7 +265,7 @@ struct EntryColumns {
     Entry at(std::size_t k) const {
         Entry entry;
         entry.t = t[k], entry.dt = dt[k], entry.real = real[k];
-        entry.used = used[k], entry.confirmed = confirmed[k], entry.last_of_step = last_of_step[k];
+        entry.used = used[k], entry.confirmed = confirmed[k], entry.due = due[k], entry.last_of_step = last_of_step[k];
         std::copy_n(&predicted_mean[k * kMean], kMean, entry.predicted_mean.begin());
         std::copy_n(&mean[k * kMean], kMean, entry.mean.begin());
         std::copy_n(&predicted_covariance[k * kWide], kWide, entry.predicted_covariance.begin());
@@ -303,6 +303,7 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     v.column("histories.real", columns.real, total, 1);
     v.column("histories.used", columns.used, total, 1);
     v.column("histories.confirmed", columns.confirmed, total, 1);
+    v.column("histories.due", columns.due, total, 1);
     v.column("histories.last_of_step", columns.last_of_step, total, 1);
     v.column("histories.predicted_mean", columns.predicted_mean, total, kMean);
     v.column("histories.mean", columns.mean, total, kMean);

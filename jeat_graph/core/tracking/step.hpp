@@ -78,6 +78,7 @@ public:
             entries[i].real = s_.tracks.real[i];
             entries[i].used = s_.tracks.used[i];
             entries[i].confirmed = s_.tracks.evidence.confirmed_s[i] == s_.t;
+            entries[i].due = due_[i];
             entries[i].last_of_step = true;
         }
     }
@@ -530,17 +531,25 @@ private:
 
     void report(std::vector<std::uint8_t>& reported) {
         Tracks& tracks = s_.tracks;
-        double period = std::numeric_limits<double>::infinity();
-        for (const Sensor& sensor : s_.sensors)
-            if (sensor.period_s > 0.0) period = std::min(period, sensor.period_s);
         reported.resize(tracks.size());
+        due_.resize(tracks.size());
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             const double gap = s_.t - tracks.evidence.confirmed_s[i];
-            const bool due = !(gap <= kSameTimeS || gap < kDue * period);
-            const double survival = due ? s_.gaps.survival(gap, c_) : 1.0;
+            due_[i] = gap > kSameTimeS && gap >= kDue * period_of_last(i);
+            const double survival = due_[i] ? s_.gaps.survival(gap, c_) : 1.0;
             reported[i] = tracks.real[i] * survival > c_.report &&
                           (gap < kSameTimeS || share_inside(i) > c_.inside_share);
         }
+    }
+
+    // Period of the sensor that confirmed a track last, of the slowest one of several.
+    double period_of_last(std::size_t row) const {
+        const std::size_t S = s_.sensors.size();
+        double period = 0.0;
+        for (std::size_t k = 0; k < S; ++k)
+            if (s_.tracks.last_box_s[row * S + k] == s_.tracks.evidence.confirmed_s[row] && s_.sensors[k].period_s > period)
+                period = s_.sensors[k].period_s;
+        return period;
     }
 
     void write_predictions(Record& record, std::size_t sensor) {
@@ -589,6 +598,7 @@ private:
     std::vector<SidesExpected> expected_;
     std::vector<double> p_detect_, q_, of_clutter_;
     std::vector<std::uint8_t> confirms_;  // of the scan's boxes
+    std::vector<std::uint8_t> due_;       // of the tracks that are told
     std::vector<std::array<double, 4>> innovations_;  // of the pairs that are made
     std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
     std::vector<CameraTrack> camera_tracks_, moved_tracks_;
