@@ -126,30 +126,35 @@ class Evidence(ArrayTable):
         )
 
 
-def count_hits(
-    evidence: Evidence,
-    rows: IntArray,
-    sensor: int,
-    logits: FloatArray,
-    gain: FloatArray,
-    stationary: BoolArray,
-    confirms: BoolArray,
-    clock: ScanClock,
-    c: ModelConstants,
-) -> Evidence:
-    """Return the evidence after a sensor found some tracks again.
+class Hits(NamedTuple):
+    """Tracks (K,) that a sensor found again in one scan.
 
-    Args:
-        evidence: before.
-        rows: (K,) tracks that were found.
-        sensor: index of the sensor.
+    Attributes:
+        rows: (K,) the tracks.
         logits: (K,) of the scores.
         gain: (K,) log likelihood of each detection against noise.
         stationary: (K,) which of the tracks stood.
         confirms: (K,) which detections tell that the track is still there.
+    """
+
+    rows: IntArray
+    logits: FloatArray
+    gain: FloatArray
+    stationary: BoolArray
+    confirms: BoolArray
+
+
+def count_hits(evidence: Evidence, hits: Hits, sensor: int, clock: ScanClock, c: ModelConstants) -> Evidence:
+    """Return the evidence after a sensor found some tracks again.
+
+    Args:
+        evidence: before.
+        hits: what it found.
+        sensor: index of the sensor.
         clock: of the sensor's scan.
         c: constants.
     """
+    rows, logits, gain, stationary, confirms = hits
     new = evidence.copy()
     at = (rows, sensor)
     first = (new.hits[at] <= 0.0) & (new.owner[rows] != sensor)

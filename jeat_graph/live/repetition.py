@@ -87,7 +87,8 @@ class Repetition:
             return self._base.holds(scan)
         if self._between(scan.t):
             return self._base.holds(scan)
-        return was_taken(scan)
+        # One that has certainly not come is new, if too late for the tracker: clocks are compared by it, too.
+        return known is None and was_taken(scan)
 
     def _between(self, t: float) -> bool:
         """Whether a time (s) is known to be none that the tracker has gone through."""

@@ -99,7 +99,8 @@ def sensor_tracks_in_steps(
 ) -> Generator[None, None, SensorTracks]:
     """Do what `sensor_tracks` does, a part of a track each step."""
     start = float(np.floor(t.min() / STEP_S)) * STEP_S if len(t) else 0.0
-    steps = int(np.ceil((t.max() - start) / STEP_S)) + 1 if len(t) else 1
+    # Two at least: velocities are taken of it, also where there is no track.
+    steps = max(int(np.ceil((t.max() - start) / STEP_S)) + 1 if len(t) else 0, 2)
     grid = start + STEP_S * np.arange(steps)
     centres, sizes, measured, moves = [], [], [], []
     order = np.lexsort((t, track_id))

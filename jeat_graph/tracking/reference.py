@@ -362,9 +362,8 @@ def count_hits_and_misses(
     presence[hit] = visibility.seen(len(hit))
     presence[missed] = visibility.miss(presence[missed], p_detect[missed])
     logits = scan.logits[pairs.box]
-    counted = evidence.count_hits(
-        tracks.evidence, hit, k, logits, pairs.ratio, stationary[hit], pairs.confirms, clock, c
-    )
+    found = evidence.Hits(hit, logits, pairs.ratio, stationary[hit], pairs.confirms)
+    counted = evidence.count_hits(tracks.evidence, found, k, clock, c)
     counted = evidence.count_misses(counted, missed, k, visible, stationary[missed], clock.weight)
     keep = math.exp(-clock.weight * c.correlation_time_s / c.track_p_detect_memory_s)
     recent_hits, recent_misses, used = (

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.stats import beta
 
 from jeat_graph.filters import object_probability as op
-from jeat_graph.filters.evidence import Evidence, ScanClock, count_hits
+from jeat_graph.filters.evidence import Evidence, Hits, ScanClock, count_hits
 from jeat_graph.filters.model_constants import ModelConstants
 
 C = ModelConstants()
@@ -230,17 +230,8 @@ def test_scores_count_once_a_track_however_often_it_is_found():
     logits, clock = np.array([1.0]), ScanClock(0.0, 0.05, 0.05 / 0.3)
     evidence = Evidence.of_births(0.0, 0, 1, logits, np.zeros(1), clock.weight)
     for n in range(1, 100):
-        evidence = count_hits(
-            evidence,
-            np.array([0]),
-            0,
-            logits,
-            np.array([2.0]),
-            np.array([False]),
-            np.array([n < 60]),
-            clock._replace(t=0.05 * n),
-            C,
-        )
+        hits = Hits(np.array([0]), logits, np.array([2.0]), np.array([False]), np.array([n < 60]))
+        evidence = count_hits(evidence, hits, 0, clock._replace(t=0.05 * n), C)
     eta = op.score_log_odds(evidence, sensors_of(1), C)[0, 0]
     assert eta == pytest.approx(1.0 - 1.0)
     assert evidence.hits[0, 0] == pytest.approx(99 * 0.05 / 0.3)

@@ -222,7 +222,8 @@ def test_scans_of_a_network_tell_how_the_camera_moves(net, tmp_path, capsys):
     np.testing.assert_allclose(found.camera_motion[1:, 3:5], np.tile([4.0, 0.0], (14, 1)), atol=0.1)
     assert main(["track", *words, "--out", str(tmp_path / "one")]) == 0
     assert (tmp_path / "one" / "detections.csv").read_bytes() == out.read_bytes()
-    assert main(["track", str(out), "--image", "320x240", "--out", str(tmp_path / "two")]) == 0
+    again = ["track", str(out), "--detector-frames", str(net), "--image", "320x240"]
+    assert main([*again, "--out", str(tmp_path / "two")]) == 0
     one, two = ((tmp_path / name / "causal.csv").read_bytes() for name in ("one", "two"))
     assert one == two
     capsys.readouterr()
