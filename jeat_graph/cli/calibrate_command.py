@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 WRITES = ("out",)
 HELP = (
-    "Find sensors, clocks and what scores mean from recordings, with or without truth; write a configuration."
+    "estimate sensor rates, clocks and what scores mean from recordings, with or without "
+    "ground truth; write a configuration"
 )
 
 

@@ -12,7 +12,7 @@ from jeat_graph.config.argument_types import not_negative
 from jeat_graph.data.errors import DataError
 
 WRITES_INTO = ("out",)
-HELP = "compare filter and smoothers on a run: errors, error against lag, consistency; tables and pictures"
+HELP = "compare the filter with smoothers of several lags on a run: errors, error against lag, consistency"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,18 +20,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "run_directory",
         metavar="RUN",
-        help="directory of a run; it is tracked again from its inputs, which must not have changed",
+        help="run directory; its inputs are tracked again, so they must not have changed",
     )
     parser.add_argument(
         "--gt",
         metavar="FILE",
-        help="truth; without motion in it positions are judged by its boxes, without truth consistency alone",
+        help="ground truth; if it has no motion, positions are compared with its boxes; without --gt "
+        "only consistency is shown",
     )
     parser.add_argument(
         "--road",
         metavar="FILE",
-        help="truth on the road: errors in m and km/h of a run with a camera too "
-        "(default: gt_road.csv beside --gt, if it is there)",
+        help="ground truth on the road, for a run with a camera: also errors in m and km/h (default: "
+        "gt_road.csv beside --gt, if it exists)",
     )
     parser.add_argument(
         "--out", metavar="DIR", help="where to write compare.json and pictures (default: RUN)"
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--detections",
         nargs="+",
         metavar="FILE",
-        help="the run's inputs, in their order, if they have moved since",
+        help="the run's inputs, in their order, if they have moved",
     )
     parser.add_argument(
         "--lags",

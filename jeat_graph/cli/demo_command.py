@@ -26,7 +26,10 @@ if TYPE_CHECKING:
     from jeat_graph.eval.tables import Table
     from jeat_graph.runs.demo_recording import DemoRecording
 
-HELP = "track a highway at night with both sensors and with each alone, and show what comes out"
+HELP = (
+    "track a simulated highway at night with both sensors and with each alone; write the "
+    "recording, tracks, scores and a picture"
+)
 COLUMNS = ("sensors", "MOTA", "HOTA", "IDF1", "FP", "FN", "IDSW")
 SCENARIO = "night-nolight"
 DURATION_S = 24.0
@@ -39,7 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.add_argument("--out", default="demo", metavar="DIR", help="folder to write into (default demo)")
     add_config(parser, settings=False)
-    simulated = parser.add_argument_group("beyond the recording that comes along (needs jeat-graph-sehn)")
+    simulated = parser.add_argument_group(
+        "other recordings than the one that comes along (needs jeat-graph-sehn)"
+    )
     add = simulated.add_argument
     add("--scenario", metavar="NAME", help=f"a scenario of `simulate` (default {SCENARIO})")
     add("--duration", type=float, metavar="S", help=f"length (default {DURATION_S:g})")
@@ -47,10 +52,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--from-raw",
         action="store_true",
-        help="go the whole way with a short clip as well: simulate pictures and events, find the vehicles in "
-        "them, track, judge, and draw a film and a strip of pictures",
+        help="also start from raw data: simulate a short clip of pictures and events, detect the "
+        "vehicles, track and evaluate them, and draw a film and a strip of pictures",
     )
-    film = parser.add_argument_group("a film instead of all this")
+    film = parser.add_argument_group("a film instead")
     add = film.add_argument
     add(
         "--film",

@@ -33,21 +33,21 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         "--detector-frames",
         default="auto",
         metavar="NAME|FILE.onnx",
-        help="what finds vehicles in frames: auto (default; what on this machine fits the first seconds), "
-        "motion (what moves before a camera that stands still), a network's name (`jeat-graph detectors`) or "
-        "file",
+        help="detector for frames: auto (default; the detector on this machine that fits the first "
+        "seconds best), motion (whatever moves in front of a fixed camera), or a network's name "
+        "(`jeat-graph detectors`) or file",
     )
     add(
         "--detector-events",
         default="motion",
         metavar="NAME|FILE.onnx",
-        help="what finds vehicles in events: motion (default), or a network",
+        help="detector for events: motion (default), or a network's name or file",
     )
     add(
         "--detector-fused",
         metavar="NAME|FILE.onnx",
-        help="a network that looks at frames and events of the same pixels at once (`train fused`), "
-        "instead of the other two; either may be missing",
+        help="one network for frames and events of the same pixels (`train fused`), instead of the "
+        "other two; either input may be missing",
     )
     add_looking(parser)
     add_frame_times(parser)
@@ -55,7 +55,8 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         "--event-rate",
         type=positive,
         metavar="HZ",
-        help="scans of the events per second (default: 50; of networks beside frames, and of both, 20)",
+        help="event scans per second (default: 50; 20 for networks of events beside frames and "
+        "networks of both)",
     )
     add_event_layout(parser)
     add(
@@ -63,7 +64,7 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         type=finite,
         default=0.0,
         metavar="S",
-        help="what to add to the events' times for the clock of the frames (default: 0)",
+        help="seconds to add to the events' times, to match the clock of the frames (default: 0)",
     )
 
 
@@ -72,9 +73,10 @@ def add_frame_times(parser: argparse._ActionsContainer) -> None:
     parser.add_argument(
         "--frame-times",
         metavar="triggers[:CHANNEL][:fall]",
-        help="each frame was taken when a trigger in --events rose, or fell, one a frame: triggers (the only "
-        "channel that has as many), triggers:0, triggers:0:fall; `events info` counts them (default: as the "
-        "frames say)",
+        help="take the frames' times from the rising (or falling) edges of a trigger in --events, one "
+        "per frame: triggers (the only channel with as many edges as frames), triggers:0, "
+        "triggers:0:fall; `events info` counts the edges (default: the times that the frames "
+        "have)",
     )
 
 
@@ -103,8 +105,8 @@ def add_looking(parser: argparse._ActionsContainer) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="change one of these settings, say model_frames.layout=yolov8, or camera.follow=false for boxes "
-        "without the camera's own motion; may be given many times",
+        help="change one of these settings, for example model_frames.layout=yolov8, or "
+        "camera.follow=false to ignore the camera's own motion; may be repeated",
     )
     add(
         "--mask",
@@ -112,8 +114,9 @@ def add_looking(parser: argparse._ActionsContainer) -> None:
         action="append",
         default=[],
         metavar="FILE.yaml|X1,Y1,X2,Y2,…",
-        help="leave out boxes that lie mostly in a polygon (px): its corners, or a file with `masks: {name: "
-        "[[x, y], …]}`; may be given many times; none: not even a burnt-in clock",
+        help="leave out boxes that lie mostly in a polygon (px), given by its corners or by a file "
+        "with `masks: {name: [[x, y], …]}`; may be repeated; none: do not even mask a burnt-in "
+        "clock",
     )
 
 
@@ -130,28 +133,32 @@ def add_event_layout(parser: argparse._ActionsContainer, *names_of_size: str) ->
         *names_of_size,
         type=picture_size,
         metavar="WxH",
-        help="size of the events' picture in px, if their file does not say; not smaller than it says",
+        help="size of the events' picture in px, if the file does not give it; never smaller than in "
+        "the file",
     )
     add(
         "--event-columns",
         metavar="t,x,y,p",
-        help="what the columns of a table of events are, if neither names nor data say (- passes one over)",
+        help="meaning of the columns in a table of events, if neither names nor data show it (- skips "
+        "a column)",
     )
     add(
         "--event-time-unit",
         choices=UNITS,
-        help="unit of the times of a table of events, if neither names nor data say",
+        help="unit of the times in a table of events, if neither names nor data show it",
     )
     add(
         "--event-stream",
         metavar="NAME",
-        help="which events of a file with several: topic of a bag, group of HDF5, file of an archive",
+        help="which recording to read, if a file holds several: topic of a bag, group of HDF5, file "
+        "of an archive",
     )
     add(
         "--event-clock",
         choices=CLOCKS,
-        help="times of a bag's events: by the camera's own clock from the first message's stamp on (sensor, "
-        "default), or by the stamps in the headers of all messages; `events info` shows both",
+        help="times of a bag's events: sensor (default) follows the camera's own clock from the first "
+        "message's stamp on, header follows the stamps in the headers of all messages; `events "
+        "info` shows both",
     )
 
 
@@ -178,7 +185,7 @@ def add_made_by(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(
             f"--detector-{name}",
             metavar="NAME|FILE.onnx",
-            help=f"the network that makes the boxes of {sensor}; the tracker takes the file beside it",
+            help=f"the network that makes the boxes of {sensor}; the tracker reads the file beside it",
         )
 
 

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from jeat_graph.detection.models.pictures import ModelPictureDetector
     from jeat_graph.eval.tables import Cell
 
-HELP = "list the detectors that have names: size, licence, accuracy, speed here, and whether they are here"
+HELP = (
+    "list the known networks: size, licence, accuracy, speed on this machine, and whether "
+    "they are installed; download one"
+)
 #: Pictures that are looked at to time a network, and the first ones that do not count.
 _LOOKS, _WARM_UP = 5, 1
 #: Height and width of a picture to time with (px).

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     from jeat_graph.eval.tables import Table
 
 WRITES = ("json",)
-HELP = "Judge a run, a trajectory table, or another tracker's result against ground truth."
+HELP = (
+    "evaluate a run, a trajectory table or another tracker's result against ground truth: "
+    "MOTA, HOTA, IDF1, RMSE"
+)
 FORMATS = ("text", "markdown", "csv", "latex")
 _MANY: dict[str, Any] = {"nargs": "+", "action": "extend"}
 
@@ -29,29 +32,61 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
     # Not `run`: that name is taken by the function that the entry point calls.
-    add("runs", nargs="+", metavar="RUN", help="run directory, table or result; several are pooled")
-    add("--gt", **_MANY, required=True, metavar="FILE", help="truth of each RUN, in the same order")
-    add("--json", metavar="FILE", help="write all scores as JSON; - writes them to stdout instead")
-    add("--format", choices=FORMATS, default="text", help="form of the table on stdout")
+    add(
+        "runs",
+        nargs="+",
+        metavar="RUN",
+        help="run directory, trajectory table or result of another tracker; the scores of several are pooled",
+    )
+    add("--gt", **_MANY, required=True, metavar="FILE", help="ground truth of each RUN, in the same order")
+    add(
+        "--json",
+        metavar="FILE",
+        help="write all scores as JSON into this file; - writes them to stdout instead of the table",
+    )
+    add("--format", choices=FORMATS, default="text", help="format of the table on stdout (text)")
     add("--iou", type=share, default=0.5, help="smallest IoU of a match (0.5)")
-    add_classes(parser, "classes to be found; others are ignored, and so are tracks of another class")
+    add_classes(
+        parser,
+        "evaluate objects of these classes only; other objects, and tracks of another class, are ignored",
+    )
     add_tables(parser)
     add_time_unit(parser, " of --gt and --detections; RUN is in seconds")
-    add("--max-age", type=positive, metavar="S", help="how far to predict causal rows (0.15)")
-    add("--max-gap", type=positive, metavar="S", help="join no smoothed rows further apart than this")
+    add(
+        "--max-age",
+        type=positive,
+        metavar="S",
+        help="predict causal rows over at most this time in seconds (0.15)",
+    )
+    add(
+        "--max-gap",
+        type=positive,
+        metavar="S",
+        help="do not interpolate between smoothed rows that are further apart than this time in seconds",
+    )
     add(
         "--outside",
         choices=("false", "ignored"),
         default="false",
-        help="what rows before the first and after the last time of the truth are (false)",
+        help="how to count rows before the first and after the last time of the truth (false)",
     )
-    add("--breakdown", action="store_true", help="also by motion and distance, and waiting times")
-    add("--detections", **_MANY, metavar="FILE", help="also AP of the detections of each RUN")
+    add(
+        "--breakdown",
+        action="store_true",
+        help="also print scores by motion and distance, and times to confirm and recover vehicles",
+    )
+    add(
+        "--detections",
+        **_MANY,
+        metavar="FILE",
+        help="also print the average precision of each RUN's detections",
+    )
     add(
         "--road",
         **_MANY,
         metavar="FILE",
-        help="truth of each RUN on the road (gt_road.csv): also errors in m and km/h of its road tables",
+        help="ground truth of each RUN on the road (gt_road.csv): also print errors of its road "
+        "tables in m and km/h",
     )
 
 

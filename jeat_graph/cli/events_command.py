@@ -15,7 +15,7 @@ from jeat_graph.io.events.converting import WRITTEN
 from jeat_graph.io.events.opening import FORMATS
 
 WRITES = ("out",)
-HELP = "say what is in a file of events, or convert it: RAW, DAT, AEDAT, HDF5, ROS bags, text, arrays"
+HELP = "describe an event file, or convert it: RAW, DAT, AEDAT, HDF5, ROS bags, text, arrays"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

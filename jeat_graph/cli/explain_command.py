@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from jeat_graph.runs.explaining import PlaceStory, TrackMoment
 
 WRITES = ("out",)
-HELP = "say why something in a run is a track, or is not: the terms of its log odds over time"
+HELP = "explain why something in a run is a track, or is not: the terms of its log odds over time"
 # Rows of a track's table.
 _ROWS = 16
 _SUFFIXES = (".png", ".svg", ".pdf")

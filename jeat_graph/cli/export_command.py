@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 WRITES = ("out",)
 HELP = (
-    "write a run for other programs: CVAT, COCO, OTAnalytics, TUM, rerun; a road for SUMO, highD, maps; a "
-    "simulated set for RVT and DSEC-Detection"
+    "write a run for other programs (CVAT, COCO, OTAnalytics, TUM, rerun), a road for SUMO, "
+    "highD and maps, or a simulated set for RVT and DSEC-Detection"
 )
 ROAD_TARGETS = ("sumo", "highd", "geojson")
 SET_TARGETS = ("rvt", "rvt-input", "dsec-det")

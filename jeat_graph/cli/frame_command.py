@@ -10,7 +10,7 @@ from jeat_graph.config.argument_types import counting
 from jeat_graph.data.errors import DataError
 
 WRITES = ("out",)
-HELP = "write one picture of a video as PNG, with a grid that tells the pixels for lines, zones and lengths"
+HELP = "write one picture of a video as PNG, with a pixel grid for reading off lines, zones and lengths"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

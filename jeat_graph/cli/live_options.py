@@ -25,20 +25,20 @@ def add_duration(parser: argparse._ActionsContainer) -> None:
         "--duration",
         type=positive,
         metavar="S",
-        help="how long to look at a camera that is on (default: until Ctrl-C)",
+        help="how long to record a live camera, in seconds (default: until Ctrl-C)",
     )
 
 
 def add_cameras(parser: argparse.ArgumentParser) -> None:
     """Declare the cameras that `stream` looks at by itself, and how."""
     group = parser.add_argument_group(
-        "cameras that are on",
-        "Scans are made here, by --detector-frames (default: auto) and --detector-events (motion), and need "
-        "not come from elsewhere; their times are s since 1970.",
+        "live cameras",
+        "Detect in live cameras, with --detector-frames (default: auto) and --detector-events "
+        "(default: motion), instead of reading scans. Times are seconds since 1970.",
     )
     add = group.add_argument
-    add("--frames", metavar="CAMERA", help=f"a camera of pictures: {CAMERAS}")
-    add("--events", metavar="CAMERA", help=f"a camera of events: {EVENT_CAMERAS}")
+    add("--frames", metavar="CAMERA", help=f"a frame camera: {CAMERAS}")
+    add("--events", metavar="CAMERA", help=f"an event camera: {EVENT_CAMERAS}")
     add_duration(group)
     add_looking(group)
 

@@ -26,28 +26,28 @@ from jeat_graph.version import __version__
 COMMANDS = (
     "demo",
     "simulate",
-    "events",
-    "detect",
-    "detectors",
-    "train",
     "track",
     "stream",
     "serve",
     "batch",
     "eval",
     "compare",
-    "count",
     "explain",
-    "draw",
-    "frame",
-    "export",
-    "view",
     "render",
     "report",
-    "calibrate",
-    "register",
+    "view",
+    "export",
+    "draw",
+    "frame",
+    "count",
     "camera",
     "road",
+    "events",
+    "detect",
+    "detectors",
+    "train",
+    "calibrate",
+    "register",
 )
 # Those that a distribution of its own brings.
 _BESIDE = ("simulate", "train")
@@ -60,11 +60,13 @@ _TO_STDOUT = ("detect",)
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:
     """Build the parser; only `command`, if given, gets its full set of arguments."""
     # What takes long to load is loaded where an interrupt is dealt with.
+    from jeat_graph.cli.examples import EXAMPLES, GroupedFormatter
     from jeat_graph.cli.options import Parser
 
     parser = Parser(
         prog="jeat-graph",
         description="Track vehicles from asynchronous event and RGB detections, causally and smoothed.",
+        formatter_class=GroupedFormatter,
     )
     parser.add_argument("--version", action="version", version=f"jeat-graph {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=Parser)
@@ -79,7 +81,8 @@ def build_parser(command: str | None = None) -> argparse.ArgumentParser:
                 raise
             commands.add_parser(name, help=HOW_TO_GET, add_help=False)
             continue
-        sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
+        example = f"example: {EXAMPLES[name]}"
+        sub = commands.add_parser(name, help=module.HELP, description=module.HELP, epilog=example)
         module.add_arguments(sub)
         sub.set_defaults(run=module.run)
     return parser

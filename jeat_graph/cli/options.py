@@ -62,7 +62,7 @@ def add_settings(parser: argparse.ArgumentParser, example: str) -> None:
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help=f"change one setting, say {example}; may be given many times",
+        help=f"change one setting, for example {example}; may be repeated",
     )
 
 
@@ -72,8 +72,8 @@ def add_image(parser: argparse.ArgumentParser) -> None:
         "--image",
         type=picture_size,
         metavar="WxH",
-        help="size of the camera's picture in px, say 1920x1080 (default: as seqinfo.ini beside the input "
-        "says, else the configuration)",
+        help="size of the camera's picture in px, for example 1920x1080 (default: from seqinfo.ini "
+        "beside the input, else from the configuration)",
     )
 
 
@@ -82,7 +82,8 @@ def add_rig(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rig",
         metavar="RIG.yaml",
-        help="the pictures and clocks of several sensors, as `jeat-graph register` writes them",
+        help="how the pictures and clocks of several sensors map to common ones, as written by "
+        "`jeat-graph register`",
     )
 
 
@@ -105,8 +106,9 @@ def add_counting(parser: argparse.ArgumentParser) -> None:
         "--classes",
         dest="class_names",
         metavar="FILE|NAMES",
-        help="names of classes that files number: one a line, YOLO's data.yaml, or with commas between them; "
-        "MOTChallenge text counts from 1, all else from 0 (default: labels.txt or classes.txt beside)",
+        help="class names for files with class numbers: a file with one name per line, YOLO's "
+        "data.yaml, or names with commas between them; MOTChallenge text counts from 1, all else "
+        "from 0 (default: labels.txt or classes.txt beside the input)",
     )
 
 
@@ -118,10 +120,10 @@ def add_frames(parser: argparse.ArgumentParser) -> None:
         "--first-frame",
         type=int,
         choices=FIRST_FRAMES,
-        help="number of the first frame of files that count frames (default: 0 where there is a frame 0, "
+        help="number of the first frame in files that count frames (default: 0 if there is a frame 0, "
         "else 1; KITTI 0)",
     )
-    add("--only-video", metavar="NAME", help="the video to read of a file that holds several")
+    add("--only-video", metavar="NAME", help="which video to read, if a file holds several")
 
 
 def add_tables(parser: argparse.ArgumentParser) -> None:
@@ -131,7 +133,7 @@ def add_tables(parser: argparse.ArgumentParser) -> None:
         "--image",
         type=picture_size,
         metavar="WxH",
-        help="size of the picture, for boxes in shares of it (YOLO)",
+        help="size of the picture, for boxes given as fractions of it (YOLO)",
     )
 
 
@@ -203,7 +205,7 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
         help="scores are in [0, 1] (unit), percent, or raw scores of any size (logistic)",
     )
     add_time_unit(parser)
-    add_classes(parser, "take detections of these classes only, and those without a class")
+    add_classes(parser, "use only detections of these classes, and detections without a class")
 
 
 def add_time_unit(parser: argparse.ArgumentParser, where: str = "") -> None:

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 WRITES = ("out",)
 HELP = (
-    "find how the pictures and clocks of two or more sensors lie to each other, from the traffic they saw or "
-    "from corresponding points, and write a rig for track, stream and calibrate"
+    "estimate the map and the clock offset between two or more sensors, from traffic, points "
+    "or a pattern; write a rig for track, stream and calibrate"
 )
 _say = partial(say, "register")
 

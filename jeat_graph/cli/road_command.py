@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from jeat_graph.road.results import RoadResult
 
 WRITES_INTO = ("out",)
-HELP = "metres, km/h and lanes on the road, each with its uncertainty"
+HELP = "compute positions (m), speeds (km/h) and lanes on the road, each with its uncertainty"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

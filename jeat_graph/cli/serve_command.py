@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-HELP = "run as a service that one file describes: sources, detectors, tracker, sinks, health and metrics"
+HELP = "run a service described by one file: sources, detectors, tracker, sinks, health and metrics"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 #: Written for hours: none of them is shared with another command.
 WRITES = ("checkpoint", "smoothed", "road", "record")
-HELP = "track scans that arrive on stdin or from a broker, and give out the tracks of each moment at once"
+HELP = "track scans as they arrive on stdin, from a broker or from live cameras, and answer each one at once"
 STDIN = "<stdin>"
 #: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
 _COMMIT_PART = 0.5
@@ -51,10 +51,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = HELP + (
         '. A scan is {"t": 0.05, "sensor": "rgb", "boxes": [[left, top, width, height], …], "scores": [s, …]}'
-        ' on a line of its own; without "scores" each is 1; "classes": [name, …] or "class_id": [number, …]'
-        " may follow; t is a number, a date or a time code; a list of such scans of one time"
-        " on one line is taken jointly. CSV has a header and the columns of `track`; its scans are complete "
-        "when another time, or an empty line, arrives."
+        ' on a line of its own. Without "scores" each score is 1. "classes": [name, …] or "class_id": '
+        "[number, …] may follow. t is a number, a date or a time code. A list of scans of one time on one "
+        "line is taken jointly. CSV input has a header and the columns of `track`; a scan is complete when "
+        "another time, or an empty line, arrives."
     )
     add = parser.add_argument
     add_config(parser)
@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format",
         choices=("json", "csv"),
         default="json",
-        help="output: one line of JSON a step, or the rows of causal.csv (default: json)",
+        help="output: one line of JSON per step, or the rows of causal.csv (default: json)",
     )
     add(
         "--source",
@@ -75,43 +75,56 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "mqtt://user:${VARIABLE}@host/topic or mqtt://user@host/topic?password_file=FILE",
     )
     add("--sink", metavar="URL", help="send tracks to mqtt://, nats:// or kafka://host/topic, not stdout")
-    add("--encoding", choices=("json", "msgpack"), default="json", help="of messages to --sink")
+    add(
+        "--encoding",
+        choices=("json", "msgpack"),
+        default="json",
+        help="encoding of messages to --sink (default: json)",
+    )
     add_counting(parser)
     add_columns(parser)
     add(
         "--joint",
         action="store_true",
-        help="hold each scan back until a later time is seen, so that scans of one time on lines of their "
-        "own give one answer",
+        help="hold each scan back until a later time arrives, so that scans of one time on separate "
+        "lines give one answer",
     )
     add(
         "--late",
         choices=("rewind", "skip", "refuse"),
         default="rewind",
-        help="scans older than one before: put where they belong (as late as live.late_s says), passed over, "
-        "or an error (default: rewind)",
+        help="what to do with a scan that is older than the newest one: rewind puts it where it "
+        "belongs (up to live.late_s), skip drops it, refuse ends with an error (default: rewind)",
     )
     add(
         "--on-error",
         choices=("stop", "skip"),
         default="stop",
-        help="a line that cannot be read: the end, with what was smoothed kept, or passed over and counted",
+        help="what to do with a line that cannot be read: stop ends the run and keeps the smoothed "
+        "rows, skip drops and counts the line (default: stop)",
     )
-    add("--smoothed", metavar="FILE", help="write the smoothed trajectories there, each row when it is final")
+    add(
+        "--smoothed",
+        metavar="FILE",
+        help="write the smoothed trajectories into this file, each row when it is final",
+    )
     add("--camera", metavar="CAMERA.yaml", help="a calibrated camera over the road, for --road")
     add(
         "--road",
         metavar="FILE",
-        help="write the vehicles' motion and size on the road there (m, km/h), each row when it is final, "
-        "smoother.lag_s later; needs --late skip or refuse",
+        help="write the vehicles' motion and size on the road (m, km/h) into this file, each row when "
+        "it is final, smoother.lag_s later; needs --late skip or refuse",
     )
     add(
         "--checkpoint",
         metavar="FILE",
-        help="keep the state there, and go on from it where it is; what was taken already may come again",
+        help="save the state in this file and continue from it, if it exists; input that was already "
+        "taken may be repeated",
     )
     add("--every", type=positive, metavar="S", help=f"time between checkpoints (default: {_EVERY_S:g})")
-    add("--record", metavar="FILE", help="at the end write counts, and how late scans came, as JSON")
+    add(
+        "--record", metavar="FILE", help="write counts, and how late scans came, as JSON when the stream ends"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -31,7 +31,10 @@ if TYPE_CHECKING:
     from jeat_graph.detection.before_tracking import DetectedFile
     from jeat_graph.detection.request import DetectRequest
 
-HELP = "track the vehicles in files of detections, or in raw frames and events, and write a run directory"
+HELP = (
+    "track vehicles in files of detections, or in raw frames and events, and write a run "
+    "directory with causal.csv and smoothed.csv"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,50 +44,51 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "detections",
         nargs="*",
         metavar="DETECTIONS",
-        help="files of one scene, say one a sensor: CSV or Parquet with t, sensor, left, top, width, height, "
-        "score; MOTChallenge det.txt; KITTI; Prophesee or DSEC .npy; COCO; a folder of YOLO's labels; "
-        "NAME=path names a sensor",
+        help="files of one scene, for example one per sensor: CSV or Parquet with t, sensor, left, "
+        "top, width, height, score; MOTChallenge det.txt; KITTI; Prophesee or DSEC .npy; COCO; a "
+        "folder of YOLO's labels. NAME=path names a sensor",
     )
     add(
         "--out",
         required=True,
         metavar="DIR",
-        help="run directory; files of an earlier run there are replaced, other files left alone",
+        help="run directory; replaces the files of an earlier run there, keeps all other files",
     )
     add_config(parser)
     add_image(parser)
     add_rig(parser)
     add_smoother(parser)
     add_formats(parser)
-    add_output_rate(parser, "frames per second of output that counts frames", "--frame-rate")
+    add_output_rate(parser, "frames per second of output formats that count frames", "--frame-rate")
     add_reading(parser)
     add(
         "--resume",
         action="store_true",
-        help="go on where a run of the same command into the same folder was broken off",
+        help="continue an interrupted run of the same command into the same folder",
     )
     add(
         "--frames",
         metavar="VIDEO|DIR|AEDAT4|CAMERA",
-        help="with DETECTIONS: the pictures that they were made from, which tell the picture's size and the "
-        f"frame rate; without: the pictures to detect in, or a camera that is on ({CAMERAS})",
+        help="with DETECTIONS: the pictures that they were made from, for their size and frame rate; "
+        f"without: the pictures to detect in, or a live camera ({CAMERAS})",
     )
     add(
         "--camera",
         metavar="CAMERA.yaml",
-        help="a calibrated camera over the road: also write road_causal.csv and road_smoothed.csv (m, km/h) "
-        "and what they are made from, as --diagnostics does",
+        help="a calibrated camera over the road: also write road_causal.csv and road_smoothed.csv (m, "
+        "km/h), and the tables of --diagnostics",
     )
     raw = parser.add_argument_group(
         "raw recordings",
-        "Without DETECTIONS vehicles are found in --frames, --events or both, and tracked; detections.csv "
-        "in the run directory holds what was found. With DETECTIONS, --detector-frames, --detector-events "
-        "and --detector-fused say which networks made the boxes of the sensors rgb, evt and fused.",
+        "Without DETECTIONS, vehicles are detected in --frames, --events or both, and tracked; "
+        "detections.csv in the run directory holds the detections. With DETECTIONS, "
+        "--detector-frames, --detector-events and --detector-fused name the networks that made "
+        "the boxes of the sensors rgb, evt and fused.",
     )
     raw.add_argument(
         "--events",
         metavar="FILE|CAMERA",
-        help=f"events to detect in, in any format of `events info`, or of a camera ({EVENT_CAMERAS})",
+        help=f"events to detect in: a file that `events info` reads, or a live camera ({EVENT_CAMERAS})",
     )
     add_duration(raw)
     add_detecting(raw)

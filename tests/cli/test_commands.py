@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 import sys
 
 import pytest
 
-from jeat_graph.cli.main import COMMANDS, main
+from jeat_graph.cli.examples import EXAMPLES, GROUPS
+from jeat_graph.cli.main import COMMANDS, build_parser, main
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -24,6 +26,20 @@ def test_the_overview_lists_every_command(capsys):
     assert end.value.code == 0
     out = capsys.readouterr().out
     assert all(command in out for command in COMMANDS)
+    shown = [line.strip() for line in out.splitlines() if line.strip()]
+    for first, title in GROUPS.items():
+        assert shown[shown.index(f"{title}:") + 1].split()[0] == first
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_each_command_has_an_example_that_it_takes(command, capsys):
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    shown = " ".join(capsys.readouterr().out.partition("example: ")[2].split())
+    assert shown == EXAMPLES[command]
+    program, *arguments = shlex.split(shown.partition(" < ")[0])
+    assert program == "jeat-graph"
+    assert build_parser(command).parse_args(arguments).command == command
 
 
 @pytest.mark.parametrize(
