@@ -67,7 +67,7 @@ def findings(name: str, text: str) -> list[str]:
     prose = without_code(text)
     out = []
     for pattern, better in RULES:
-        for match in re.finditer(pattern, prose, re.IGNORECASE):
+        for match in re.finditer(pattern.replace(" ", r"\s+"), prose, re.IGNORECASE):
             line = prose.count("\n", 0, match.start()) + 1
             out.append((line, f'{name}:{line}: "{match[0]}": {better}'))
     return [text for _, text in sorted(out)]

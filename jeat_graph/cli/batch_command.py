@@ -18,20 +18,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "manifest",
         metavar="MANIFEST",
-        help="CSV or Parquet, one recording a row: detections (files joined by ;), or frames, events or both "
-        "to detect in, and, optional, name, config, set (settings joined by ;), gt, rate, camera, "
-        "detector_frames, detector_events, class, mask; paths as seen from the manifest's folder",
+        help="CSV or Parquet with one recording per row: detections (files joined by ;), or frames, events "
+        "or both to detect in; optional: name, config, set (settings joined by ;), gt, rate, camera, "
+        "detector_frames, detector_events, class, mask; paths are relative to the manifest's folder",
     )
     add(
         "--out",
         required=True,
         metavar="DIR",
-        help="gets runs/NAME, recordings.csv and, where truth is given, scores.json; run again, it goes on",
+        help="folder for runs/NAME, recordings.csv and, with ground truth, scores.json; repeat to resume",
     )
-    add("--engine", choices=("local", "ray"), default="local", help="where to work (default: local)")
-    add("--workers", type=counting, metavar="N", help="recordings at once (default: one a core)")
-    add("--retries", type=natural, default=1, metavar="N", help="tries again when a worker dies (default: 1)")
-    add("--address", metavar="ADDRESS", help="ray: a running cluster, say auto (default: one started here)")
+    add("--engine", choices=("local", "ray"), default="local", help="where to run (default: local)")
+    add("--workers", type=counting, metavar="N", help="recordings in parallel (default: one per core)")
+    add(
+        "--retries",
+        type=natural,
+        default=1,
+        metavar="N",
+        help="further attempts if a worker dies (default: 1)",
+    )
+    add("--address", metavar="ADDRESS", help="ray: a running cluster, for example auto (default: a new one)")
     add_config(parser)
     add_image(parser)
     add_smoother(parser)

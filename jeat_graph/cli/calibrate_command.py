@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "detections",
         nargs="+",
         metavar="DETECTIONS",
-        help="one file a recording; all are pooled; NAME=path names a sensor",
+        help="one file per recording; all are pooled; NAME=path names a sensor",
     )
     add("--gt", nargs="+", action="extend", metavar="FILE", help="truth of each recording, in the same order")
     add("--out", required=True, metavar="CONFIG.yaml", help="the configuration to write")
@@ -46,12 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--frames",
         metavar="VIDEO|DIR",
-        help="pictures of one of the recordings: tell the picture's size and the frame rate of all",
+        help="pictures of one of the recordings, for the picture's size and the frame rate of all",
     )
     add(
         "--no-tune",
         action="store_true",
-        help="keep what the scores were found to mean without tracking the recordings with it",
+        help="keep every measured even_score, without tracking the recordings to check it",
     )
 
 

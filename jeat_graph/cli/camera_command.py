@@ -19,7 +19,7 @@ HELP = "calibrate a camera over a road from lengths, points and the vehicles' tr
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    finding = actions.add_parser("calibrate", help="find the camera that all the evidence agrees with")
+    finding = actions.add_parser("calibrate", help="estimate a camera from lengths, points and tracks")
     add = finding.add_argument
     add(
         "--run",
@@ -43,7 +43,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="size of the picture in px (default: that of the run)",
     )
     add("--out", required=True, metavar="CAMERA.yaml", help="the calibrated camera")
-    show = actions.add_parser("show", help="say in words what a camera's file says").add_argument
+    show = actions.add_parser(
+        "show", help="describe a camera file in words, or draw the road's grid"
+    ).add_argument
     show("camera", metavar="CAMERA.yaml", help="the camera")
     show("--picture", metavar="FILE.png", help="draw the road's grid as the camera sees it")
     show("--frame", metavar="FILE", help="picture of the camera to draw it over")

@@ -54,13 +54,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--complete",
         action="store_true",
-        help="rows for every class in every direction of every line and zone, those of nobody included",
+        help="write a row for every class and direction of every line and zone, also if the count is 0",
     )
     add_classes(parser, "count vehicles of these classes only (a track's class is the one it ends with)")
     add_tables(parser)
     add("--out", metavar="FILE", help="write the counts as CSV (default: print a table)")
     add("--crossings", metavar="FILE", help="also write every crossing as CSV")
-    add("--od", metavar="FILE", help="also write who went from which line or zone to which, as CSV")
+    add(
+        "--od",
+        metavar="FILE",
+        help="also write how many vehicles went from which line or zone to which, as CSV",
+    )
     add(
         "--stations",
         metavar="FILE",
@@ -72,14 +76,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also write these as measured data of DATEX II v3; needs --begin with a time zone, and "
         "--publisher, say --begin 2026-11-27T07:30:00+01:00 --publisher DE:city-of-bonn",
     )
-    add("--publisher", metavar="CC:NAME", help="who publishes: two letters of the country, and a name")
+    add("--publisher", metavar="CC:NAME", help="publisher: two-letter country code and name")
     add(
         "--publication-time",
         metavar="DATE",
         help="when (default: the end of the recording), with a time zone",
     )
     add("--site-table", metavar="ID", default="jeat-graph", help="the table that has the sites (%(default)s)")
-    add("--road", metavar="DIR", help="what `road` wrote with the same lines: lanes and speeds of stations")
+    add(
+        "--road",
+        metavar="DIR",
+        help="output of `road` for the same lines, for the lanes and speeds of stations",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

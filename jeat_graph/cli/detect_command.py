@@ -46,13 +46,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_duration(parser)
     add_detecting(parser)
-    add_classes(parser, "look for these classes only: names or numbers of the network's; all: every one")
+    add_classes(parser, "detect only these classes of the network, by name or number; all: every class")
     add_rate(parser)
     add(
         "--out",
         required=True,
         metavar="FILE",
-        help="FILE.csv or FILE.parquet; -: each scan at once on stdout, a line of JSON as `stream` takes it",
+        help="FILE.csv or FILE.parquet; - writes each scan at once to stdout, as a line of JSON for `stream`",
     )
 
 

@@ -34,17 +34,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         default="marks.yaml",
         metavar="FILE.yaml",
-        help="gets lines, zones and masks, as `count`, `render`, `road` and --mask read them; what is there "
-        "is shown (default: marks.yaml)",
+        help="file for lines, zones and masks, which `count`, `render`, `road` and --mask read; if it "
+        "exists, its content is shown (default: marks.yaml)",
     )
     add(
         "--lengths",
         default="lengths.csv",
         metavar="FILE.csv",
-        help="gets measured lengths, as `camera calibrate` reads them (default: lengths.csv)",
+        help="file for measured lengths, which `camera calibrate` reads (default: lengths.csv)",
     )
     add("--port", type=natural, default=0, metavar="N", help="port of this machine (default: a free one)")
-    add("--no-browser", action="store_true", help="only say the address of the page")
+    add("--no-browser", action="store_true", help="only print the address of the page")
 
 
 def run(args: argparse.Namespace) -> int:

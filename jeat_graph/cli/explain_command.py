@@ -40,11 +40,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("run_directory", metavar="RUN", help="directory of a run; its inputs must not have changed since")
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--track", type=int, metavar="ID", help="a track, reported or not")
+    what.add_argument("--track", type=int, metavar="ID", help="explain this track, reported or not")
     what.add_argument(
-        "--at", type=_place, metavar="T,X,Y", help="what is, or is not, at a time (s) and a place (px)"
+        "--at",
+        type=_place,
+        metavar="T,X,Y",
+        help="explain what is, or is not, at a time (s) and a place (px)",
     )
-    add("--out", metavar="FILE", help="also plot a track's terms there (.png, .svg, .pdf)")
+    add("--out", metavar="FILE", help="also plot the track's terms into this file (.png, .svg, .pdf)")
     add(
         "--detections", nargs="+", metavar="FILE", help="the run's inputs, in their order, if they have moved"
     )

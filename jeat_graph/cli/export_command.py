@@ -42,10 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "source",
         metavar="RUN|ROAD|SET",
-        help="run directory or trajectory table; for roads, what `road` wrote; for rvt, rvt-input and "
-        "dsec-det, what `simulate --sensors pictures` wrote",
+        help="run directory or trajectory table; for road formats the output of `road`; for rvt, "
+        "rvt-input and dsec-det the output of `simulate --sensors pictures`",
     )
-    parser.add_argument("--to", choices=TARGETS, required=True, help="what reads it")
+    parser.add_argument("--to", choices=TARGETS, required=True, help="target program or format")
     parser.add_argument(
         "--out",
         required=True,
@@ -54,20 +54,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ".geojson, folder (rvt, rvt-input, dsec-det)",
     )
     parser.add_argument(
-        "--only", choices=("causal", "smoothed"), help="which table (default: smoothed, if there)"
+        "--only", choices=("causal", "smoothed"), help="which table (default: smoothed, if it exists)"
     )
     parser.add_argument("--track", type=int, metavar="ID", help="the track, for tum")
     add_output_rate(
         parser,
-        "frames per second of the video or of the road's frames (default: as the run's input; roads: 25)",
+        "frames per second of the video or of the road's frames (default: that of the run's "
+        "input; roads: 25)",
         "--frames-per-second",
     )
     add_tables(parser)
     parser.add_argument(
-        "--camera", metavar="CAMERA.yaml", help="with its place on the map, for sumo and geojson"
+        "--camera",
+        metavar="CAMERA.yaml",
+        help="calibrated camera with its place on the map, for sumo and geojson",
     )
     parser.add_argument("--video", metavar="NAME", help="file name of the video, for ottrk")
-    parser.add_argument("--start", type=float, metavar="S", help="of the video, since 1970, for ottrk")
+    parser.add_argument(
+        "--start", type=float, metavar="S", help="start time of the video in seconds since 1970, for ottrk"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -18,8 +18,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("frames", metavar="VIDEO", help="a video, a folder of pictures, or an AEDAT4 file")
     add("--at", type=float, default=0.0, metavar="S", help="time of the picture (s; default: the first)")
-    add("--grid", action="store_true", help="draw a grid with the numbers of its pixels")
-    add("--step", type=counting, metavar="PX", help="distance of the grid's lines (default: as fits)")
+    add("--grid", action="store_true", help="draw a grid with pixel coordinates")
+    add(
+        "--step",
+        type=counting,
+        metavar="PX",
+        help="distance between the grid lines in px (default: chosen to fit)",
+    )
     add_rate(parser)
     add("--out", required=True, metavar="FILE.png", help="the picture")
 

@@ -38,8 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "detections",
         nargs="*",
         metavar="DETECTIONS",
-        help="files of detections, one a sensor or with several; each in its sensor's own picture and clock "
-        "(with --pattern they may be left out, and tell the clock if they are there)",
+        help="files of detections, with one sensor or several each; boxes are in the sensor's own "
+        "picture, times on its own clock (optional with --pattern, where they give the clock)",
     )
     add("--out", required=True, metavar="RIG.yaml", help="the rig to write")
     add(
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=_named_size,
         metavar="NAME=WxH",
-        help="size of another sensor's picture (default: as far as its boxes reach)",
+        help="size of another sensor's picture (default: the range of its boxes)",
     )
     add(
         "--points",

@@ -41,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "run_directory",
         nargs="?",
         metavar="RUN",
-        help="run directory or table of tracks; or a simulated segment, which brings its own frames, events "
-        "and truth; without: a film of the frames or events alone",
+        help="run directory or table of tracks, or a simulated segment with its own frames, events "
+        "and ground truth; without it: a film of the frames or events alone",
     )
     add("--frames", metavar="VIDEO|DIR", help="video, folder of pictures or AEDAT4 file to draw on")
     add(
@@ -58,14 +58,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         choices=PARTS,
         metavar="PART",
-        help=f"what stands beside a track: {', '.join(PARTS)} (default: all that is known)",
+        help=f"what to write beside a track: {', '.join(PARTS)} (default: all that are known)",
     )
-    add("--road", metavar="DIR", help="speeds from what `road` wrote (default: the run's tables of the road)")
+    add(
+        "--road",
+        metavar="DIR",
+        help="take speeds from this output of `road` (default: the run's road tables)",
+    )
     add(
         "--codec",
         choices=KINDS,
         default=AUTO,
-        help="of films in .mp4: h264 (by the FFmpeg of this machine), vp9, or auto (default): h264 if it can",
+        help="codec of .mp4 films: h264 (needs FFmpeg on this machine), vp9, or auto (default): h264 "
+        "if available",
     )
     add("--gt", metavar="FILE", help="truth, drawn as thin outlines")
     add_rig(parser)
@@ -88,14 +93,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--only", choices=("causal", "smoothed"), help="draw only these tracks")
     add_output_rate(parser, "pictures per second of the film (default: each frame; else 25)")
     add("--size", type=drawn_size, metavar="WxH", help="size of each picture (default: the recording's)")
-    add_classes(parser, "draw only tracks that are of one of these classes then")
+    add_classes(parser, "draw a track only while it has one of these classes")
     add_tables(parser)
     add_old_name(parser, "--frame-rate", "--rate")
     add(
         "--labels",
         choices=("all", "thin", "none"),
         default="thin",
-        help="numbers of the tracks: all, none, or thin (default): where there is room, large boxes first",
+        help="labels of the tracks: all, none, or thin (default): only where there is room, large "
+        "boxes first",
     )
     add(
         "--trails",

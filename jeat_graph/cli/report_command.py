@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     # Not `run`: that name is taken by the function that the entry point calls.
     add("run_directory", metavar="RUN", help="run directory, or a table or result of tracks")
-    add("--gt", metavar="FILE", help="truth; without it there are no scores")
+    add("--gt", metavar="FILE", help="ground truth; without it the page has no scores")
     add("--out", required=True, metavar="FILE.html", help="the page")
     add_tables(parser)
     add(

@@ -39,20 +39,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--contact",
         choices=("cuboid", "bottom", "center"),
-        help="what of a vehicle is on the road (cuboid for boxes, center for points)",
+        help="which point of a vehicle is measured on the road (default: cuboid for boxes, center for "
+        "points)",
     )
     add(
         "--contact-height",
         nargs=2,
         type=float,
         metavar=("M", "SD"),
-        help="height of the tracked point above the road and how well it is known (0.1 0.058)",
+        help="height of the tracked point above the road and its standard deviation (0.1 0.058)",
     )
     add(
         "--smoother",
         choices=("spline", "graph"),
         default="spline",
-        help="what fits boxes: our own compiled solver, or the same as a factor graph in GTSAM (spline)",
+        help="solver that fits the boxes: the compiled one, or a factor graph in GTSAM (spline)",
     )
     add_frames(parser)
     add("--interval", type=positive, metavar="S", help="length of an interval of counts.csv (300)")
@@ -60,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         required=True,
         metavar="DIR",
-        help="where road.csv, speeds.csv, crossings.csv, counts.csv, headways.csv and road.html go",
+        help="folder for road.csv, speeds.csv, crossings.csv, counts.csv, headways.csv and road.html",
     )
 
 

@@ -43,6 +43,11 @@ def test_words_that_no_textbook_has_are_found_and_their_line_is_named(sentence):
     assert found.startswith("page.md:3: ")
 
 
+def test_words_on_two_lines_are_found_where_they_begin():
+    (found,) = prose.findings("help", "train for so long; no two such\n    trainings are equal\n")
+    assert found.startswith("help:1: ")
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -69,10 +69,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     pictures = parser.add_argument_group(
         "with --sensors pictures or carla",
-        "A run that was stopped goes on where it was when it is called again, and gives the same bytes.",
+        "Repeat the command to continue an interrupted run; the result has the same bytes.",
     )
     pictures.add_argument(
-        "--segments", type=counting, metavar="N", help=f"how many (default {_SEGMENTS}; the full set: 500)"
+        "--segments",
+        type=counting,
+        metavar="N",
+        help=f"number of segments (default {_SEGMENTS}; the full set: 500)",
     )
     pictures.add_argument(
         "--frames-per-segment",
@@ -80,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="frames",
         type=counting,
         metavar="N",
-        help=f"RGB frames a segment (default {_FRAMES}; for training 20, and more segments)",
+        help=f"RGB frames per segment (default {_FRAMES}; for training 20, and more segments)",
     )
     pictures.add_argument(
         "--world",
@@ -91,16 +94,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     pictures.add_argument(
         "--event-camera",
         choices=("v2e", "davis346", "imx636", "iebcs", "ideal"),
-        help="whose thresholds and noise the event camera has (default v2e)",
+        help="thresholds and noise of this event camera (default v2e)",
     )
     pictures.add_argument(
         "--masks",
         action="store_true",
         default=None,
-        help="also write a mask a frame: which vehicle each pixel shows",
+        help="also write a mask per frame: which vehicle each pixel shows",
     )
     pictures.add_argument("--size", type=_size, metavar="WxH", help="of the pictures (default 640x384)")
-    pictures.add_argument("--workers", type=counting, metavar="K", help="processes (default: one a core)")
+    pictures.add_argument("--workers", type=counting, metavar="K", help="processes (default: one per core)")
     pictures.add_argument(
         "--video",
         choices=("mp4", "webm", "lossless", "png"),
@@ -121,8 +124,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="YAML with settings of renderer and cameras (sections render, rgb, evt)",
     )
     carla = parser.add_argument_group("with --sensors carla (experimental)")
-    carla.add_argument("--carla-host", metavar="HOST", help="where the server runs (default localhost)")
-    carla.add_argument("--carla-port", type=counting, metavar="PORT", help="its port (default 2000)")
+    carla.add_argument("--carla-host", metavar="HOST", help="host of the server (default localhost)")
+    carla.add_argument(
+        "--carla-port", type=counting, metavar="PORT", help="port of the server (default 2000)"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

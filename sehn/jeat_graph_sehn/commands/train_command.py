@@ -26,7 +26,7 @@ _NETS = ("tiny", "small", "medium", "large")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     add = parser.add_argument
-    add("kind", choices=_KINDS, help="what the network looks at (fused: both at once); events have a memory")
+    add("kind", choices=_KINDS, help="input of the network (fused: both); networks of events have a memory")
     add(
         "data",
         nargs="+",
@@ -38,16 +38,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         required=True,
         metavar="FILE.onnx",
-        help="the network; log (.csv), plot (.png) and checkpoint stand beside it",
+        help="the network; log (.csv), plot (.png) and checkpoint are written beside it",
     )
     add(
         "--test",
         nargs="+",
         default=[],
         metavar="DATA",
-        help="data sets that the finished network is judged by, each by itself",
+        help="data sets to test the finished network on, each separately",
     )
-    add("--pictures", metavar="DIR", help="where names in COCO files begin (default: beside them)")
+    add(
+        "--pictures",
+        metavar="DIR",
+        help="folder of the pictures that COCO files name (default: beside the files)",
+    )
     add(
         "--net",
         choices=_NETS,
@@ -64,24 +68,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--crop",
         type=picture_size,
         metavar="WxH",
-        help="what is learned from are cut-outs of this size (default 320x192)",
+        help="size of the cut-outs to learn from (default 320x192)",
     )
     add(
         "--start",
         nargs="+",
         default=[],
         metavar="NAME|FILE",
-        help="networks that `train` made, whose weights are the first ones: of the same kind and as wide, or "
-        "a half or another whole part of it; for fused one of frames and one of events; a NAME comes with "
-        "the package",
+        help="networks of `train` that give the initial weights: of the same kind, and as wide or "
+        "narrower by a whole factor; for fused one of frames and one of events; a NAME comes "
+        "with the package",
     )
     add(
         "--int8",
         metavar="NAME|FILE",
-        help="instead of training bring this network of `train` to 8-bit numbers, by what it sees of DATA: "
-        "half of the time with ONNX Runtime; --size gives it another input",
+        help="instead of training, quantise this network of `train` to 8-bit numbers, calibrated on "
+        "DATA: half of the time with ONNX Runtime; --size gives it another input",
     )
-    add("--batch", type=counting, metavar="N", help="cut-outs, or sequences of events, a step (default 8)")
+    add("--batch", type=counting, metavar="N", help="cut-outs, or sequences of events, per step (default 8)")
     length = parser.add_mutually_exclusive_group()
     length.add_argument(
         "--epochs", type=positive, metavar="N", help="how often all data are seen (default 30)"
@@ -90,7 +94,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--minutes",
         type=positive,
         metavar="M",
-        help="train for so long instead; no two such trainings are equal",
+        help="train for this time in minutes instead; the result is not reproducible",
     )
     add("--seed", type=natural, default=0, metavar="N", help="seed (default 0)")
     add(
