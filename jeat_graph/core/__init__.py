@@ -17,7 +17,8 @@ except ModuleNotFoundError:
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     raise CoreMissingError(
         f"jeat-graph's compiled core for Python {version} is not in {Path(__file__).parent}: build it in "
-        "that checkout with `make core` or `pip install --editable .`, which need a C++20 compiler"
+        "that checkout with `make core` or `pip install --editable .`, which need a C++20 compiler; if "
+        "jeat-graph is installed, run Python in another folder: in a checkout it takes the sources there"
     ) from None
 
 __all__ = ["detection", "events", "io", "road"]

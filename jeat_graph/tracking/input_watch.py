@@ -168,10 +168,16 @@ class InputWatch:
             centre = boxes[:, :2] + 0.5 * boxes[:, 2:]
             outside = int(((centre < 0.0) | (centre > (width, height))).any(axis=1).sum())
             if outside > _MOST_OUTSIDE * len(boxes) and not _counted.get():
+                given = self._config.input.picture == "given"
+                advice = (
+                    "is that its size, and are boxes left, top, width, height?"
+                    if given
+                    else "give its size: --image WIDTHxHEIGHT (in Python image=(width, height))"
+                )
                 self._say(
                     "outside",
                     f"{outside} of the first {len(boxes)} box centres lie outside the picture of {width:g} x "
-                    f"{height:g} px; give its size: --image WIDTHxHEIGHT (in Python image=(width, height))",
+                    f"{height:g} px; {advice}",
                 )
 
     def _say(self, kind: str, text: str) -> None:

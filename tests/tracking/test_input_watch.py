@@ -120,6 +120,14 @@ def test_scans_that_are_taken_again_after_a_late_one_are_looked_at_once():
     assert watch._times == {"rgb": [0.0, 1e3, 2e3]}
 
 
+def test_who_gave_the_picture_s_size_is_not_asked_for_it():
+    far = np.array([[2000.0, 200.0, 60.0, 40.0]] * 10)
+    tracker = Tracker(image=(1280, 720))
+    tracker.step((0.0, "rgb", far, np.full(10, 0.9)))
+    with pytest.warns(InputWarning, match="1280 x 720 px; is that its size"):
+        tracker.step((0.05, "rgb", far, np.full(10, 0.9)))
+
+
 def test_a_tracker_that_goes_on_after_a_restart_does_not_warn_again(tmp_path):
     far = np.array([[2000.0, 200.0, 60.0, 40.0]] * 10)
     tracker = Tracker("default")
