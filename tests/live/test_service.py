@@ -259,8 +259,12 @@ silent_s: 2
         )
         assert service.problem(f"127.0.0.1:{camera.port}/video: not connected")
         assert service.metric("jeat_graph_ready") == {"": 0.0}
+        wait_for(
+            lambda: service.said("sensor 'rgb': no scan for"), "the log names the silent sensor", service
+        )
         camera.start()
         wait_for(service.ready, "it is ready again", service)
+        wait_for(lambda: service.said("sensor 'rgb' gives scans again"), "and that it speaks", service)
 
         kill(begin, server)
         wait_for(lambda: service.problem("/tracks: not connected"), "the dead broker is told of", service)

@@ -7,14 +7,17 @@ import json
 import os
 import socket
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.scan import Scan
 from jeat_graph.live.service.config import read_service
 from jeat_graph.live.service.log import Log
+from jeat_graph.live.service.status import Status
 from jeat_graph.live.service.systemd import Watchdog, notify, watchdog_s
 
 GOOD = """\
@@ -170,3 +173,18 @@ class TestSystemd:
         monkeypatch.setenv("WATCHDOG_PID", "1")
         notify("READY=1")
         assert watchdog_s() is None
+
+
+def test_all_sensors_may_fall_silent_and_each_is_named_once(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr("jeat_graph.live.service.status.time.monotonic", lambda: now[0])
+    status = Status("gate", silent_s=10.0)
+    scan = {name: Scan(1.0, name, np.zeros((0, 4)), np.zeros(0)) for name in ("rgb", "evt")}
+    status.came(scan.values())
+    now[0] = 109.0
+    assert status.changes_of_silence() == []
+    now[0] = 112.0
+    assert status.changes_of_silence() == [("rgb", 12.0), ("evt", 12.0)]
+    assert status.changes_of_silence() == []
+    status.came([scan["evt"]])
+    assert status.changes_of_silence() == [("evt", None)]

@@ -22,7 +22,7 @@ from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.service.cameras import Cameras
 from jeat_graph.live.service.config import ServiceConfig
 from jeat_graph.live.service.ends import OpenedSource, Sinks, open_sinks, open_sources
-from jeat_graph.live.service.log import ERROR, INFO, Log
+from jeat_graph.live.service.log import ERROR, INFO, WARNING, Log
 from jeat_graph.live.service.status import RUNNING, STOPPING, Status
 from jeat_graph.live.service.systemd import Watchdog, notify
 from jeat_graph.live.service.web import Web
@@ -104,13 +104,22 @@ class Service:
                 return TROUBLE
 
     def _stopped(self) -> bool:
-        self.status.alive()
+        self._look_around()
         return self._interrupts.seen is not None
 
     def _overdue(self) -> bool:
         """Asked by brokers in each slice of a wait, so that a long wait is no sign of death."""
-        self.status.alive()
+        self._look_around()
         return self._interrupts.overdue()
+
+    def _look_around(self) -> None:
+        """Be alive, and say which sensors have fallen silent by the clock on the wall, be it all of them."""
+        self.status.alive()
+        for name, silent_s in self.status.changes_of_silence():
+            if silent_s is None:
+                self._log.write(INFO, f"sensor {name!r} gives scans again")
+            else:
+                self._log.write(WARNING, f"sensor {name!r}: no scan for {silent_s:.0f} s")
 
     def _serve(self, cameras: Cameras, stack: ExitStack) -> int:
         log, status, config = self._log, self.status, self._config

@@ -117,6 +117,7 @@ class Status:
     beat: float = field(default_factory=time.monotonic)
     detectors_beat: Callable[[], float] = time.monotonic
     _since: float = field(default_factory=time.monotonic)
+    _silent: set[str] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def alive(self) -> None:
@@ -166,11 +167,24 @@ class Status:
             if not camera.connected
         ]
         found += [
-            f"sensor {name!r}: no scan for {now - one.seen:.0f} s"
-            for name, one in self._copied().items()
-            if now - one.seen > self.silent_s
+            f"sensor {name!r}: no scan for {silent_s:.0f} s" for name, silent_s in self._silent_for(now)
         ]
         return found
+
+    def changes_of_silence(self) -> list[tuple[str, float | None]]:
+        """Return which sensors have fallen silent since this was asked last, and for how long (s) they are.
+
+        Those that give scans again have None.
+        """
+        silent = dict(self._silent_for(time.monotonic()))
+        fallen = [(name, silent_s) for name, silent_s in silent.items() if name not in self._silent]
+        again = [(name, None) for name in sorted(self._silent - set(silent))]
+        self._silent = set(silent)
+        return [*fallen, *again]
+
+    def _silent_for(self, now: float) -> list[tuple[str, float]]:
+        seen = ((name, now - one.seen) for name, one in self._copied().items())
+        return [(name, silent_s) for name, silent_s in seen if silent_s > self.silent_s]
 
     def health(self) -> dict[str, Any]:
         """Return what `/health` says, as plain data."""
