@@ -67,18 +67,6 @@ class SharedPaths(NamedTuple):
     prior: FloatArray
 
 
-def build_graph(paths: Sequence[PathRows], prior: FloatArray, prior_right: FloatArray) -> Any:
-    """Return GTSAM's graph: states are x0, x1, … of the first path, x100000, … of the second; s is shared."""
-    import gtsam
-
-    whole = gtsam.GaussianFactorGraph()
-    for number, path in enumerate(paths):
-        for factor in _factors(path, number):
-            whole.add(factor)
-    whole.add(gtsam.JacobianFactor(gtsam.symbol(_SHARED, 0), prior, prior_right, _unit(len(prior_right))))
-    return whole
-
-
 def solve_paths(paths: Sequence[PathRows], prior: FloatArray, prior_right: FloatArray) -> SharedPaths:
     """Solve the graph.
 
