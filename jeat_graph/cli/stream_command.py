@@ -227,6 +227,8 @@ def _tracker(args: argparse.Namespace, config: Config) -> tuple[LiveTracker, dic
                 f"{args.checkpoint}: was saved with --late {live.policy}, not {args.late}; give the same, or "
                 "begin anew without the file"
             )
+        if live.time is not None:
+            _say(f"goes on from {args.checkpoint}, t = {live.time:.6g}")
         return live, more
     return LiveTracker(tracker, args.late), {}
 

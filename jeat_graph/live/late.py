@@ -137,20 +137,26 @@ class LiveTracker:
         batch = [self._on_common_clock(scan) for scan in given]
         self.measured = []
         repeated, new = self._repetition.sort(batch, self._was_taken, given)
+        # What by its time was taken and by its content never came is too late, and clocks are compared by it.
+        late = [
+            scan
+            for scan, own in zip(batch, given, strict=True)
+            if scan in repeated and self._repetition.never_came(own)
+        ]
         released = Released([new] if new else [], [])
         if self._room is not None:
             released = self._room.enter(new, self._base.bound_s)
         admitted = [self._admit(scans) for scans in released.batches]
         self._repetition.note(given)  # what the tracker refuses has not come
-        for scan in released.missed:
+        missed = [*released.missed, *late]
+        for scan in missed:
             self.lateness.add(scan.sensor, max((self.time or 0.0) - scan.t, 0.0), True)
-        news = self._clocks.saw(new)
+        news = self._clocks.saw([scan for scan in batch if scan in new or scan in late])
         if news is not None and news.taken_off:
             news.lines.extend(self._wait_for(news))
         waiting = [] if self._room is None else [scan for scan in new if self._room.holds(scan)]
-        return self._arrival(admitted, repeated)._replace(
-            waiting=waiting, missed=released.missed, clocks=news
-        )
+        repeated = [scan for scan in repeated if scan not in late]
+        return self._arrival(admitted, repeated)._replace(waiting=waiting, missed=missed, clocks=news)
 
     def _admit(self, scans: list[Scan]) -> Admitted:
         """Take in scans that need not wait, as far as their times are believed."""

@@ -59,6 +59,10 @@ class Repetition:
             del self._base.row[self._kept :]
         return again, new
 
+    def never_came(self, scan: Scan) -> bool:
+        """Whether a scan, with its sensor's own time, has certainly not come before."""
+        return self._memory.knows(fingerprint_of(scan)) is False
+
     def note(self, scans: Sequence[Scan]) -> None:
         """Take note of scans that have come, with their sensors' own times."""
         for scan in scans:
@@ -87,8 +91,7 @@ class Repetition:
             return self._base.holds(scan)
         if self._between(scan.t):
             return self._base.holds(scan)
-        # One that has certainly not come is new, if too late for the tracker: clocks are compared by it, too.
-        return known is None and was_taken(scan)
+        return was_taken(scan)
 
     def _between(self, t: float) -> bool:
         """Whether a time (s) is known to be none that the tracker has gone through."""
