@@ -244,7 +244,7 @@ class ModelConstants:
     camera_memory: float = 0.97
     camera_time_s: float = 0.3
 
-    confirming: float = 0.3
+    confirming: float = 0.15
     report: float = 0.5
     inside_share: float = 0.8
     rival: float = 0.3

@@ -45,6 +45,7 @@ from jeat_graph.tracking.reference_life import (
     is_due,
     judge,
     learn,
+    own_p_detect,
     report,
 )
 from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks, SensorScan
@@ -86,7 +87,7 @@ class Reported(NamedTuple):
     Attributes:
         tracks: (N,) the tracks after it, before any ends.
         reported: (N,) which are reported.
-        due: (N,) of which whoever confirmed them last has had the time to look again.
+        due: (N,) which a sensor that sees them as well as any has looked at since they were confirmed.
         takers: per scan (M,) identity of the track that took each box; every box has one.
         records: per scan, for the smoother.
         nis: per scan (M,) of `AssociatedPairs`, NaN where a box began a track.
@@ -148,7 +149,7 @@ def step(
     for given, taker in zip(scans, takers, strict=True):
         count_false_boxes(state, given.sensor, taker, c)
     learn(state, t, c)
-    out = Reported(state.tracks, report(state, t, c), is_due(state), takers, records, nis, noise_scale)
+    out = Reported(state.tracks, report(state, t, c), is_due(state, c), takers, records, nis, noise_scale)
     end_tracks(state, t, c)
     return out
 
@@ -264,11 +265,7 @@ def follow_camera(state: ReferenceState, scan: SensorScan, dt: float, c: ModelCo
 def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> AssociatedPairs:
     """Find the boxes of tracks: the assignment of greatest log likelihood ratio."""
     tracks, k = state.tracks, scan.sensor
-    hits, misses = tracks.recent_hits[:, k], tracks.recent_misses[:, k]
-    p_detect = (state.sensors.p_detect[k] * c.p_detect_strength + hits) / (
-        c.p_detect_strength + hits + misses
-    )
-    p_detect = np.clip(p_detect, *c.track_p_detect_bounds)
+    p_detect = own_p_detect(tracks, state.sensors.p_detect, c)[:, k]
     noise = float(state.log_side_variance[k])
     innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, scan.edges, noise, c)
     size = singer.expected_size(tracks.mean)

@@ -17,8 +17,8 @@ from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks,
 
 # Two times that differ by less are one (s).
 _SAME_TIME_S = 1e-6
-# Before this share of a sensor's period is over it has not had the time to miss a track.
-_DUE = 0.9
+# One sensor sees a track about as well as another of which the track's own P_D is at most so much larger.
+_AS_WELL = 0.5
 _LEAST_AREA = 1e-9
 # Longer ago than this is no longer told apart (s).
 _LONGEST_AGO_S = 1e9
@@ -103,21 +103,28 @@ def report(state: ReferenceState, t: float, c: ModelConstants) -> BoolArray:
     A gap begins with the last detection that told that the track was still there.
     """
     gap = np.asarray(state.time - state.tracks.evidence.confirmed_s)
-    survival = np.where(is_due(state), gap_survival.survival(state.gaps, gap, c), 1.0)
+    survival = np.where(is_due(state, c), gap_survival.survival(state.gaps, gap, c), 1.0)
     inside = (share_inside(state) > c.inside_share) | (gap < _SAME_TIME_S)
     return np.asarray((state.tracks.real * survival > c.report) & inside)
 
 
-def is_due(state: ReferenceState) -> BoolArray:
-    """Return whether whoever confirmed each track (N,) last has had the time to look again.
+def is_due(state: ReferenceState, c: ModelConstants) -> BoolArray:
+    """Return whether a sensor that sees a track (N,) about as well as any has looked since it was confirmed.
 
-    Until then it is no gap. Of several that found it at that time the slowest one counts.
+    Until then it is no gap.
     """
-    confirmed_s = state.tracks.evidence.confirmed_s
-    gap = state.time - confirmed_s
-    found = state.tracks.last_box_s == confirmed_s[:, None]
-    period = np.where(found & (state.period_s > 0.0), state.period_s, 0.0).max(axis=1, initial=0.0)
-    return np.asarray((gap > _SAME_TIME_S) & (gap >= _DUE * period))
+    tracks = state.tracks
+    looked = state.last_look_s[None] > tracks.evidence.confirmed_s[:, None]
+    p_detect = own_p_detect(tracks, state.sensors.p_detect, c)
+    best = np.where(looked, p_detect, 0.0).max(axis=1, initial=0.0)
+    return np.asarray((best > 0.0) & (best >= _AS_WELL * p_detect.max(axis=1, initial=0.0)))
+
+
+def own_p_detect(tracks: ReferenceTracks, p_detect: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return each track's own P_D (N, S) by each sensor, whose means are `p_detect` (S,)."""
+    hits, looks = tracks.recent_hits, tracks.recent_hits + tracks.recent_misses
+    own = (p_detect * c.p_detect_strength + hits) / (c.p_detect_strength + looks)
+    return np.asarray(np.clip(own, *c.track_p_detect_bounds))
 
 
 def end_tracks(state: ReferenceState, t: float, c: ModelConstants) -> None:

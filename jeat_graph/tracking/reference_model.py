@@ -46,7 +46,7 @@ class Step(NamedTuple):
         real: (N,) their posterior.
         used: (N,) the sensors that found them.
         confirmed: (N,) whether a detection of that time tells that they are still there.
-        due: (N,) whether whoever confirmed them last has had the time to look again.
+        due: (N,) whether a sensor that sees them as well as any has looked since.
     """
 
     t: float

@@ -255,7 +255,7 @@ def test_a_poor_box_upon_a_better_one_keeps_no_track_reported(overlaps):
         t, late = 0.05 * k, k >= 40
         x = 700.0 - (60.0 if overlaps else 0.0) * t
         boxes = np.array([[500.0, 400.0, 100.0, 60.0], [x, 410.0, 90.0, 60.0]])
-        told.append(len(made.step([(t, "rgb", boxes, np.array([0.9, 0.4 if late else 0.9]))])))
+        told.append(len(made.step([(t, "rgb", boxes, np.array([0.9, 0.22 if late else 0.9]))])))
     assert min(told[10:40]) == 2
     assert told[-1] == (1 if overlaps else 2)
     smoothed = made.finish()

@@ -85,7 +85,7 @@ struct Entry {
     double real = 0.0;  // posterior after the step, where this was its last update
     std::int64_t used = 0;
     bool confirmed = false;  // by a detection of that time
-    bool due = false;        // whoever found it last has had the time to look again
+    bool due = false;        // a sensor that sees it as well as any has looked since
     bool last_of_step = false;
     std::array<double, kMean> predicted_mean, mean;
     Halves predicted_covariance, covariance;

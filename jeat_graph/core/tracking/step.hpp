@@ -19,7 +19,7 @@
 namespace jeat::tracking {
 
 inline constexpr double kPeriodMemory = 0.9, kGapPeriods = 1.5, kLongestPeriodS = 0.1;
-inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6, kDue = 0.9;
+inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6, kAsWell = 0.5;
 // Longer ago than this is no longer told apart (s).
 inline constexpr double kLongestAgoS = 1e9;
 
@@ -270,7 +270,7 @@ private:
 
     void associate(Scan& scan) {
         Tracks& tracks = s_.tracks;
-        const std::size_t n = tracks.size(), S = s_.sensors.size(), k = scan.sensor;
+        const std::size_t n = tracks.size(), k = scan.sensor;
         const double rho2 = exp_of(s_.log_side_variance[k]);
         scan.noise_scale = rho2 / square(c_.side_std);
         expected_.resize(n);
@@ -286,9 +286,7 @@ private:
         const ByLeft index(boxes_);
         pairs_.clear();
         for (std::size_t i = 0; i < n; ++i) {
-            const double hits = tracks.recent_hits[i * S + k], misses = tracks.recent_misses[i * S + k];
-            p_detect_[i] = clamp((s_.belief.p_detect[k] * c_.p_detect_strength + hits) / (c_.p_detect_strength + hits + misses),
-                                 c_.track_p_detect_bounds.low, c_.track_p_detect_bounds.high);
+            p_detect_[i] = own_p_detect(i, k);
             expected_[i] = expected_sides(tracks.mean_of(i), tracks.covariance_of(i), rho2, c_);
             const SidesExpected& expected = expected_[i];
             const double p = clamp(tracks.presence[i * kPresences + kVisible] * p_detect_[i],
@@ -535,21 +533,30 @@ private:
         due_.resize(tracks.size());
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             const double gap = s_.t - tracks.evidence.confirmed_s[i];
-            due_[i] = gap > kSameTimeS && gap >= kDue * period_of_last(i);
+            due_[i] = is_due(i);
             const double survival = due_[i] ? s_.gaps.survival(gap, c_) : 1.0;
             reported[i] = tracks.real[i] * survival > c_.report &&
                           (gap < kSameTimeS || share_inside(i) > c_.inside_share);
         }
     }
 
-    // Period of the sensor that confirmed a track last, of the slowest one of several.
-    double period_of_last(std::size_t row) const {
-        const std::size_t S = s_.sensors.size();
-        double period = 0.0;
-        for (std::size_t k = 0; k < S; ++k)
-            if (s_.tracks.last_box_s[row * S + k] == s_.tracks.evidence.confirmed_s[row] && s_.sensors[k].period_s > period)
-                period = s_.sensors[k].period_s;
-        return period;
+    // Whether a sensor that sees a track about as well as any other has looked since it was confirmed.
+    bool is_due(std::size_t row) const {
+        double best = 0.0, looked = 0.0;
+        for (std::size_t k = 0; k < s_.sensors.size(); ++k) {
+            const double p = own_p_detect(row, k);
+            best = std::max(best, p);
+            if (s_.sensors[k].last_look_s > s_.tracks.evidence.confirmed_s[row]) looked = std::max(looked, p);
+        }
+        return looked > 0.0 && looked >= kAsWell * best;
+    }
+
+    // A track's own P_D by a sensor.
+    double own_p_detect(std::size_t row, std::size_t k) const {
+        const std::size_t at = row * s_.sensors.size() + k;
+        const double hits = s_.tracks.recent_hits[at], misses = s_.tracks.recent_misses[at];
+        return clamp((s_.belief.p_detect[k] * c_.p_detect_strength + hits) / (c_.p_detect_strength + hits + misses),
+                     c_.track_p_detect_bounds.low, c_.track_p_detect_bounds.high);
     }
 
     void write_predictions(Record& record, std::size_t sensor) {
