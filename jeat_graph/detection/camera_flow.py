@@ -50,7 +50,8 @@ _KEY_FOUND, _KEY_GONE, _KEY_GROWN, _KEY_S = 0.5, 0.15, 0.1, 10.0
 class CameraSettings(Section):
     """Whether, and how, the motion of the camera is told from its pictures."""
 
-    follow: bool = flag(True, "whether networks tell how the camera moves")
+    # Not unless asked: where a camera stands, headlights that sweep a dark road pass for its motion.
+    follow: bool = flag(False, "whether networks tell how the camera moves")
     width_px: int = number(480, "px", "pictures are looked at in this width", 64, 4096)
 
 

@@ -37,7 +37,7 @@ def seen(grey, pose=(0.0, 0.0, 0.0, 0.0), noise=2.0, seed=0):
 
 def motions(frames, boxes=None):
     """The motions that are told of pictures, one a picture or None."""
-    flow = CameraFlow()
+    flow = CameraFlow(CameraSettings(follow=True))
     out = []
     for k, frame in enumerate(frames):
         one = NO_BOXES if boxes is None else boxes[k]
@@ -92,7 +92,7 @@ def test_known_motions_are_found(kind):
 
 def test_a_camera_that_stands_still_has_no_motion():
     """Pictures with noise, whose light changes: scans are the very same objects."""
-    grey, flow = street(), CameraFlow()
+    grey, flow = street(), CameraFlow(CameraSettings(follow=True))
     for k in range(60):
         frame = seen(grey * (1.0 - 0.2 * np.sin(k / 9.0)), noise=4.0, seed=k)
         scan = Scan(k / RATE, "rgb", NO_BOXES, np.zeros(0))
@@ -136,7 +136,7 @@ def test_after_pictures_that_tell_nothing_it_goes_on():
 
 
 def test_it_can_be_switched_off():
-    grey, flow = street(), CameraFlow(CameraSettings(follow=False))
+    grey, flow = street(), CameraFlow()
     for k in range(3):
         scan = Scan(k / RATE, "rgb", NO_BOXES, np.zeros(0))
         assert flow(seen(grey, (9.0 * k, 0, 0, 0)), scan) is scan
