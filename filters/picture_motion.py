@@ -62,7 +62,7 @@ class CameraVelocity(NamedTuple):
 
     @staticmethod
     def none() -> CameraVelocity:
-        """Return that of a camera of which nothing is known."""
+        """Return an unknown velocity: zero, and not valid at any time."""
         return CameraVelocity(np.zeros(2), np.zeros(4), -math.inf, -math.inf)
 
     def at(self, t: float) -> CameraVelocity:
@@ -106,7 +106,7 @@ def follow(
     before: CameraVelocity,
     times: tuple[float, float],
 ) -> tuple[FloatArray, FloatArray, CameraVelocity]:
-    """Take tracks along with the camera as its newest picture shows it.
+    """Compensate tracks for the camera's motion, as measured between its last two pictures.
 
     Args:
         mean: (N, 2, 7) states that are predicted to the picture.

@@ -13,7 +13,6 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.in_steps import run_through
 
 # Scans of the second sensor that are compared, and boxes of one that are.
 _SCANS, _LEAST_SCANS, _MOST_BOXES = 240, 60, 24
@@ -55,28 +54,18 @@ class _Looks(NamedTuple):
     boxes: FloatArray
 
 
-def best_agreement(first: Detections, second: Detections) -> Agreement | None:
-    """Find at which difference of the clocks the boxes of two sensors agree best.
+def agreement_in_steps(
+    first: Detections, second: Detections, pairs: int | None = None
+) -> Generator[None, None, Agreement | None]:
+    """Find at which difference of the clocks the boxes of two sensors agree best; one difference a step.
 
     Args:
         first: of the sensor whose clock is taken for right.
         second: of the other; both in one picture.
+        pairs: so many pairs of boxes are compared in one step at most, by looking at fewer scans.
 
     Returns:
         The agreement; None where there is too little to compare.
-    """
-    return run_through(agreement_in_steps(first, second))
-
-
-def agreement_in_steps(
-    first: Detections, second: Detections, pairs: int | None = None
-) -> Generator[None, None, Agreement | None]:
-    """Do what `best_agreement` does, one difference of the clocks a step.
-
-    Args:
-        first: as there.
-        second: as there.
-        pairs: so many pairs of boxes are compared in one step at most, by looking at fewer scans.
     """
     if min(len(first), len(second)) < _LEAST_BOXES:
         return None

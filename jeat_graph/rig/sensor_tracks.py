@@ -11,7 +11,6 @@ import numpy as np
 from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.in_steps import run_through
 
 #: Step of the grid (s).
 STEP_S = 0.1
@@ -80,10 +79,10 @@ class SensorTracks:
         return np.where(np.take_along_axis(there.T, order, axis=1), order, -1)
 
 
-def sensor_tracks(
+def sensor_tracks_in_steps(
     t: FloatArray, track_id: IntArray, boxes: FloatArray, detections: Detections
-) -> SensorTracks:
-    """Put smoothed tracks on a grid, and find the detections that they rest on.
+) -> Generator[None, None, SensorTracks]:
+    """Put smoothed tracks on a grid, and find the detections that they rest on; a part of a track a step.
 
     Args:
         t: (R,) times of the rows (s).
@@ -91,13 +90,6 @@ def sensor_tracks(
         boxes: (R, 4) left, top, width, height (px).
         detections: of this sensor alone.
     """
-    return run_through(sensor_tracks_in_steps(t, track_id, boxes, detections))
-
-
-def sensor_tracks_in_steps(
-    t: FloatArray, track_id: IntArray, boxes: FloatArray, detections: Detections
-) -> Generator[None, None, SensorTracks]:
-    """Do what `sensor_tracks` does, a part of a track each step."""
     start = float(np.floor(t.min() / STEP_S)) * STEP_S if len(t) else 0.0
     # Two at least: velocities are taken of it, also where there is no track.
     steps = max(int(np.ceil((t.max() - start) / STEP_S)) + 1 if len(t) else 0, 2)

@@ -149,7 +149,8 @@ def step(
     for given, taker in zip(scans, takers, strict=True):
         count_false_boxes(state, given.sensor, taker, c)
     learn(state, t, c)
-    out = Reported(state.tracks, report(state, t, c), is_due(state, c), takers, records, nis, noise_scale)
+    due = is_due(state, c)
+    out = Reported(state.tracks, report(state, due, c), due, takers, records, nis, noise_scale)
     end_tracks(state, t, c)
     return out
 
@@ -220,9 +221,10 @@ def follow_picture(
     step_s: float,
     c: ModelConstants,
 ) -> None:
-    """Take tracks, last predicted to `step_s` (s), along with the camera, with the first scan of a time.
+    """Compensate the tracks for the camera's motion as its newest picture shows it.
 
-    A motion that the scan's boxes speak against is none.
+    Done with the first scan of a time; `step_s` is the time of the step before (s). A motion that contradicts
+    the scan's boxes is ignored.
     """
     t, camera = state.time, state.camera_velocity.at(state.time)
     state.camera_velocity = camera

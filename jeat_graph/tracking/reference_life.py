@@ -97,13 +97,13 @@ def learn(state: ReferenceState, t: float, c: ModelConstants) -> None:
         state.sensors = object_probability.learn_sensors(told, state.sensors, c)
 
 
-def report(state: ReferenceState, t: float, c: ModelConstants) -> BoolArray:
+def report(state: ReferenceState, due: BoolArray, c: ModelConstants) -> BoolArray:
     """Return which tracks (N,) are reported: real, and their gap, if any, likely to end well.
 
-    A gap begins with the last detection that told that the track was still there.
+    A gap begins with the last detection that confirmed the track, and counts once it is due (N,).
     """
     gap = np.asarray(state.time - state.tracks.evidence.confirmed_s)
-    survival = np.where(is_due(state, c), gap_survival.survival(state.gaps, gap, c), 1.0)
+    survival = np.where(due, gap_survival.survival(state.gaps, gap, c), 1.0)
     inside = (share_inside(state) > c.inside_share) | (gap < _SAME_TIME_S)
     return np.asarray((state.tracks.real * survival > c.report) & inside)
 

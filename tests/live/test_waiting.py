@@ -76,7 +76,7 @@ def test_one_room_takes_over_another():
     old = WaitingRoom({"evt": 1.0}, 2.0, 0.0, 0.0)
     old.enter([scan(1.5, "rgb")], FAR_S)
     room = WaitingRoom({"lidar": 0.2}, 4.0, 1.0, 0.0).beside(old)
-    assert room.enter([scan(1.6, "lidar")], FAR_S).batches == []  # evt is waited for, too
+    assert room.enter([scan(1.6, "lidar")], FAR_S).batches == []  # the room also waits for evt
     batches = room.enter([scan(1.7, "evt")], FAR_S).batches
     assert [batch[0].t for batch in batches] == [1.5, 1.6]
 

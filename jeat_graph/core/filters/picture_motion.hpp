@@ -44,6 +44,7 @@ struct CameraVelocity {
     Similarity rate;
     double picture_s = -std::numeric_limits<double>::infinity(), until_s = -std::numeric_limits<double>::infinity();
 
+    bool known() const { return picture_s > -std::numeric_limits<double>::infinity(); }
     CameraVelocity at(double t) const { return t <= until_s ? *this : CameraVelocity{}; }
 
     static CameraVelocity after(const PictureMotion& motion, double t) {
@@ -90,6 +91,7 @@ inline void follow(double* mean, double* covariance, const CameraChange& change,
 
 // Predict a track by `predict`, which is told of its own velocity only: the camera's goes straight on for `dt` (s).
 template <class Predict> void with_camera(double* mean, const CameraVelocity& camera, double dt, Predict predict) {
+    if (!camera.known()) return predict();
     const auto before = camera.rate.displacement(mean[kPosition], mean[kStates + kPosition]);
     for (int axis = 0; axis < 2; ++axis) mean[axis * kStates + kVelocity] -= before[axis];
     predict();

@@ -281,9 +281,9 @@ private:
             q_[j] = expit(s_.belief.indifference[k] + scan.logits[j]);
             of_clutter_[j] = association::score_likelihood(c_.clutter_precision, q_[j], c_);
         }
-        weigh_boxes(scan);
         const association::ScanTerms terms(s_.sensors[k].leftovers, s_.width * s_.height, c_);
         const ByLeft index(boxes_);
+        weigh_boxes(scan, index);
         pairs_.clear();
         for (std::size_t i = 0; i < n; ++i) {
             p_detect_[i] = own_p_detect(i, k);
@@ -311,8 +311,7 @@ private:
     }
 
     // Which boxes tell that their track is still there, by score and overlap with a better box of the scan.
-    void weigh_boxes(const Scan& scan) {
-        const ByLeft index(boxes_);
+    void weigh_boxes(const Scan& scan, const ByLeft& index) {
         confirms_.resize(boxes_.size());
         for (std::size_t j = 0; j < boxes_.size(); ++j) {
             double overlap = 0.0;
