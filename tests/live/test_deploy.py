@@ -27,7 +27,9 @@ def test_the_unit_says_what_the_command_does():
     unit = UNIT.read_text()
     assert "Type=notify" in unit
     assert re.search(r"^WatchdogSec=\d+$", unit, re.M)
-    assert "ExecStart=/opt/jeat-graph/bin/jeat-graph serve /etc/jeat-graph/%i.yaml" in unit
+    assert (
+        "ExecStart=/opt/jeat-graph/bin/jeat-graph serve --set-aside-damaged /etc/jeat-graph/%i.yaml" in unit
+    )
 
 
 def test_logrotate_takes_its_file(tmp_path):
