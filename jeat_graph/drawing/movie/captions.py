@@ -35,8 +35,10 @@ class Captions:
         speeds: tuple[FloatArray, IntArray, FloatArray] | None = None,
     ) -> None:
         self._parts = parts
-        named = None if table.classes is None else table.classes
-        self._classes = {} if named is None else _by_track(table.t, table.track_id, named)
+        self._classes = {}
+        if table.classes is not None:
+            said = table.classes != ""
+            self._classes = _by_track(table.t[said], table.track_id[said], table.classes[said])
         self._speeds = {} if speeds is None else _by_track(*speeds)
 
     def of(self, track_id: int, t: float) -> str:
@@ -44,11 +46,11 @@ class Captions:
         texts = []
         if CLASS in self._parts and track_id in self._classes:
             times, names = self._classes[track_id]
-            at = max(int(np.searchsorted(times, t + _TOLERANCE_S, side="right")) - 1, 0)
-            texts.append(str(names[at]))
+            said = int(np.searchsorted(times, t + _TOLERANCE_S, side="right"))
+            texts += [str(name) for name in names[:said][-1:]]
         if NUMBER in self._parts:
-            texts.append(f"#{track_id}" if any(texts) else str(track_id))
-        caption = " ".join(text for text in texts if text)
+            texts.append(f"#{track_id}" if texts else str(track_id))
+        caption = " ".join(texts)
         if SPEED in self._parts and track_id in self._speeds:
             speed = _near(*self._speeds[track_id], t)
             if not math.isnan(speed):
