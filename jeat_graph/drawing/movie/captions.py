@@ -15,6 +15,7 @@ from jeat_graph.data.trajectories import Trajectories
 NUMBER, CLASS, SPEED = "id", "class", "speed"
 PARTS = (CLASS, NUMBER, SPEED)
 _TOLERANCE_S = 1e-6
+_ByTrack = Mapping[int, tuple[FloatArray, FloatArray | TextArray]]
 #: A speed is of so much before or after (s).
 _REACH_S = 0.5
 
@@ -35,11 +36,11 @@ class Captions:
         speeds: tuple[FloatArray, IntArray, FloatArray] | None = None,
     ) -> None:
         self._parts = parts
-        self._classes = {}
+        self._classes: _ByTrack = {}
         if table.classes is not None:
             said = table.classes != ""
             self._classes = _by_track(table.t[said], table.track_id[said], table.classes[said])
-        self._speeds = {} if speeds is None else _by_track(*speeds)
+        self._speeds: _ByTrack = {} if speeds is None else _by_track(*speeds)
 
     def of(self, track_id: int, t: float) -> str:
         """Return the caption of a track at a time (s): its class is the one that it was last said to have."""
@@ -71,9 +72,7 @@ def read_speeds(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:
     return table.number("t"), table.whole("track_id"), speed
 
 
-def _by_track(
-    t: FloatArray, track_id: IntArray, values: FloatArray | TextArray
-) -> Mapping[int, tuple[FloatArray, FloatArray | TextArray]]:
+def _by_track(t: FloatArray, track_id: IntArray, values: FloatArray | TextArray) -> _ByTrack:
     """Return times and values of each track, in order of time."""
     order = np.lexsort((t, track_id))
     ids = track_id[order]

@@ -63,7 +63,7 @@ class Metrics:
         if status.saved is not None:
             age: list[tuple[list[str], float]] = [([], now - status.saved)]
             yield family(gauge, "checkpoint_age_seconds", "since the newest checkpoint", age)
-        aside = [([], float(len(status.set_aside)))]
+        aside: list[tuple[list[str], float]] = [([], float(len(status.set_aside)))]
         yield family(gauge, "checkpoints_set_aside", "that could not be gone on from at the start", aside)
         for name, value in health["messages"].items():
             yield family(counter, name, f"messages or checkpoints {name.replace('_', ' ')}", [([], value)])
