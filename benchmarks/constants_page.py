@@ -46,13 +46,15 @@ one of the factors of the last table.
   luck, which choosing among many values by their scores collects.
 - *Chosen without this set, from the shipped* is a check of direction. It begins at constants that were
   chosen with the set in view, so it cannot say how good they would be without it. It says whether the
-  other sets pull away from it.
-- *Random start* multiplies the {{most}} constants that matter most by random factors between
+  other sets pull away from it."""
+_STARTS = f"""- *Random start* multiplies the {{most}} constants that matter most by random factors between
   1/{START_SPREAD:g} and {START_SPREAD:g}. *Chosen without this set, from there* is what the same search
   reaches: it knows the values of these constants from the other sets alone. Which constants these are, and
   the values of all others, come from all sets.
 - *Chosen with it, from there* is the same search from the same start on all sets. What it has over the row
-  before is what a chooser gains on a set by seeing it."""
+  before is what a chooser gains on a set by seeing it.
+
+The constants of the random starts: {{names}}. Starts: {{starts}}{{averaged}}."""
 
 
 def tables(result: Mapping[str, Any]) -> dict[str, Table]:
@@ -172,18 +174,22 @@ def write_page(path: Path, result: Mapping[str, Any], found: Mapping[str, Table]
         found: its tables.
     """
     shown = {key: table.render("markdown").strip() for key, table in found.items()}
-    seeds = result["settings"]["seeds"]
-    count = len({row["name"] for row in result["singles"]})
-    sweeps = result["settings"]["sweeps"]
+    count, starts = len({row["name"] for row in result["singles"]}), len(result["random"])
+    how = _CHOOSING.format(nearby=result["settings"]["nearby"])
+    if starts:
+        how += "\n" + _STARTS.format(
+            most=len(result["searched"]),
+            names=", ".join(f"`{name}`" for name in result["searched"]),
+            starts=starts,
+            averaged=", over which scores are averaged" if starts > 1 else "",
+        )
     parts = [
         "# Constants",
         made_by(result),
         _HOW,
         "## Chosen without a set",
-        _CHOOSING.format(most=len(result["searched"]), nearby=result["settings"]["nearby"]),
-        f"Random starts: {len(seeds)}"
-        + (", over which scores are averaged" if len(seeds) > 1 else "")
-        + f". Sweeps of a search over all moves: {sweeps}.",
+        how,
+        f"Sweeps of a search over all moves: {result['settings']['sweeps']}.",
         shown["constants-mean"],
         _scatter(result["rows"]),
         shown["constants-sets"],
