@@ -32,6 +32,10 @@ KINDS = {
     "tumtraf": (_TABLES, "trackers on TUMTraf: cameras over a road, boxes in OpenLABEL"),
     "real": (_TABLES, "trackers on all recordings of a folder"),
     "simulated": (_TABLES, "trackers on simulated highways, streets, squares, and with odd detectors"),
+    "constants": (
+        "benchmarks.constants",
+        "which constants of the model matter, and what they reach on a set that they were chosen without",
+    ),
     "detection": ("benchmarks.detection", "how well detectors find vehicles in raw pictures and raw events"),
     "raw": ("benchmarks.raw", "from raw pictures and raw events to tracks"),
     "road": ("benchmarks.road", "place and speed on the road, simulated and against laser gates"),
@@ -70,7 +74,7 @@ class _LateParser(Parser):
 
 
 #: Options that say where a result is read or written, and not what it is.
-_PLACES = ("--out", "--readme", "--page", "--from", "--jobs")
+_PLACES = ("--out", "--readme", "--page", "--from", "--jobs", "--cache")
 
 
 def build_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:
