@@ -32,6 +32,7 @@ KINDS = {
     "tumtraf": (_TABLES, "trackers on TUMTraf: cameras over a road, boxes in OpenLABEL"),
     "real": (_TABLES, "trackers on all recordings of a folder"),
     "simulated": (_TABLES, "trackers on simulated highways, streets, squares, and with odd detectors"),
+    "ablation": ("benchmarks.ablation", "what each term of the model gains, over all sets"),
     "constants": (
         "benchmarks.constants",
         "which constants of the model matter, and what they reach on a set that they were chosen without",
