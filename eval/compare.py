@@ -124,6 +124,8 @@ def _error_table(errors: dict[str, dict[str, float]], motion: bool) -> Table:
             "position/filter": one["position_rmse"] / base["position_rmse"],
             "velocity/filter": one["velocity_rmse"] / base["velocity_rmse"],
             "ANEES position": one["anees_position"],
+            "ANEES velocity": one["anees_velocity"],
+            "ANEES acceleration": one["anees_acceleration"],
             "ANEES state": one["anees_state"],
         }
         records.append(record if motion else {key: record[key] for key in _OF_PLACES})
@@ -142,7 +144,10 @@ def _group_table(groups: Sequence[dict[str, Any]], title: str, motion: bool) -> 
         for part in ("position", "velocity") if motion else ("position",):
             for name in ("filter", "full"):
                 record[f"{part} {name}"] = one[name][f"{part}_rmse"]
-        record["ANEES filter"] = one["filter"]["anees_position"]
-        record["ANEES full"] = one["full"]["anees_position"]
+        for name in ("filter", "full"):
+            record[f"ANEES {name}"] = one[name]["anees_position"]
+        if motion:
+            for name in ("filter", "full"):
+                record[f"ANEES velocity {name}"] = one[name]["anees_velocity"]
         records.append(record)
     return Table.from_records(records, title=f"{title} (RMSE in px{', px/s' if motion else ''})")
