@@ -151,10 +151,10 @@ def tracks_of(
     ids = np.concatenate([one.track_id for one in records])
     order = np.argsort(ids, kind="stable")
     axes = records[0].mean.shape[1]
-    columns = {
-        name: np.concatenate([getattr(one, name) for one in records])[order]
+    before, before_cov, after, after_cov = (
+        np.concatenate([getattr(one, name) for one in records])[order]
         for name in ("predicted_mean", "predicted_covariance", "mean", "covariance")
-    }
+    )
     F = np.concatenate([np.broadcast_to(one.F, (len(one.F), axes, *one.F.shape[2:])) for one in records])[
         order
     ]
@@ -163,6 +163,6 @@ def tracks_of(
     out = []
     for a, b in zip(starts, [*starts[1:], len(order)], strict=True):
         rows = slice(int(a), int(b))
-        own = {name: column[rows] for name, column in columns.items()}
-        out.append(FilteredTrack(int(ids[order[a]]), times[rows], F[rows], sensor=sensor[rows], **own))
+        states = before[rows], before_cov[rows], after[rows], after_cov[rows]
+        out.append(FilteredTrack(int(ids[order[a]]), times[rows], F[rows], *states, sensor[rows]))
     return out
