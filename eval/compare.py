@@ -129,6 +129,8 @@ def _error_table(errors: dict[str, dict[str, float]], motion: bool) -> Table:
             "position/filter": one["position_rmse"] / base["position_rmse"],
             "velocity/filter": one["velocity_rmse"] / base["velocity_rmse"],
             "ANEES position": one["anees_position"],
+            "ANEES velocity": one["anees_velocity"],
+            "ANEES acceleration": one["anees_acceleration"],
             "ANEES state": one["anees_state"],
         }
         records.append(record if motion else {key: record[key] for key in _OF_PLACES})
@@ -145,7 +147,8 @@ def _group_table(groups: Sequence[dict[str, Any]], title: str, motion: bool) -> 
     for one in groups:
         record: dict[str, Cell] = {"group": one["group"], "instants": int(one["filter"]["count"])}
         kinds = ("position", "velocity") if motion else ("position",)
-        columns = [(part, f"{part}_rmse") for part in kinds] + [("ANEES position", "anees_position")]
+        columns = [(part, f"{part}_rmse") for part in kinds]
+        columns += [(f"ANEES {part}", f"anees_{part}") for part in kinds]
         for label, key in columns:
             record[f"{label}, filter"] = one["filter"][key]
             record[f"{label}, {_WHOLE}"] = one["full"][key]
