@@ -96,15 +96,12 @@ def run(args: argparse.Namespace) -> int:
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:
     """Judge all terms on all sets."""
-    groups = list(
-        read_sets("mot", Path(args.root), LayoutOptions((), args.rate, sets=tuple(args.sets or ())))
-    )
+    layout = LayoutOptions((), args.rate, sets=tuple(args.sets or ()))
+    groups = list(read_sets("mot", Path(args.root), layout))
     if args.world_seconds:
+        seeds, length = args.seeds or [0], args.world_seconds
         groups += [
-            RecordingSet(
-                world, tuple(simulated(world, seed, args.world_seconds) for seed in args.seeds or [0])
-            )
-            for world in _WORLDS
+            RecordingSet(world, tuple(simulated(world, seed, length) for seed in seeds)) for world in _WORLDS
         ]
     near = nearby(args.nearby)
     with ScoreBook(Path(args.cache) if args.cache else None, args.jobs or available_cores()) as book:

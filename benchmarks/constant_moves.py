@@ -15,6 +15,7 @@ from jeat_graph.filters.model_constants import ModelConstants
 
 #: Constants that are no part of what the model says, and why.
 TECHNICAL = {
+    "gate": "bounds the search for pairs, where clutter has long been likelier",
     "most_perspective": "bounds the growth in a step for which the transition is linearised",
     "fastest_growth": "bounds a power that would grow without limit",
     "first_period_s": "stands for the period of a sensor until its second scan",
@@ -25,7 +26,7 @@ TECHNICAL = {
 #: Constants between 0 and 1, of which a factor changes the odds.
 PROBABILITIES = frozenset(
     {
-        *("cut_share", "uncovered_share", "outlier_share", "clutter_memory", "clutter_precision"),
+        *("cut_share", "uncovered_share", "clutter_memory", "clutter_precision"),
         *("p_detect", "chance_hit", "unseen_share", "stationary_unseen_share", "shared_false"),
         *("noise_share", "peak_share", "repeat_overlap", "repeat_share", "repeat_told", "best_share"),
         *("gap_overlap", "sure", "camera_memory", "confirming", "report", "inside_share", "rival"),

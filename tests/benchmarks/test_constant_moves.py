@@ -47,7 +47,7 @@ def test_a_move_changes_one_constant():
     moved = asdict(Move("jerk", 1.4)(SHIPPED))
     assert moved == asdict(SHIPPED) | {"jerk": pytest.approx(1.4 * SHIPPED.jerk)}
     assert str(Move("jerk", 1.4)) == "jerk × 1.4"
-    assert len(single_moves(["jerk", "gate"], [0.7, 1.4])) == 4
+    assert len(single_moves(["jerk", "cut_gate"], [0.7, 1.4])) == 4
 
 
 def test_random_points_lie_within_their_spread_and_a_factor_hangs_on_name_and_seed_alone():

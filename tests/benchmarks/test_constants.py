@@ -34,7 +34,7 @@ from jeat_graph.io.tables.truth_io import write_truth
 
 BEST = {"near": 2.0, "far": 6.0, "farther": 18.0}
 FACTOR = 1.2
-NAMES = ("jerk", "gate", "growth_noise")
+NAMES = ("jerk", "cut_gate", "growth_noise")
 
 
 class Parabolas:
@@ -46,7 +46,7 @@ class Parabolas:
     def samples(self, point, kind="causal"):
         """MOTA alone changes; no recording differs from another."""
         away = math.log(point.constants.jerk / BEST[point.group.name])
-        scores = [80.0 - 10.0 * away**2 - 0.001 * point.constants.gate, 60.0, 70.0]
+        scores = [80.0 - 10.0 * away**2 - 0.001 * point.constants.cut_gate, 60.0, 70.0]
         return np.tile(scores, (1 + RESAMPLED, 1))
 
 
@@ -96,9 +96,9 @@ def test_a_set_has_less_of_what_was_chosen_without_it_and_the_rows_say_so(found)
 
 
 def test_constants_that_matter_come_first_and_those_that_no_set_notices_are_named(found):
-    assert most_influential(found["singles"], 3) == ["jerk", "gate", "growth_noise"]
+    assert most_influential(found["singles"], 3) == ["jerk", "cut_gate", "growth_noise"]
     assert found["searched"] == ["jerk"]
-    assert unnoticed(found["singles"]) == ["gate", "growth_noise"]
+    assert unnoticed(found["singles"]) == ["cut_gate", "growth_noise"]
     jerk = next(row for row in found["singles"] if row["name"] == "jerk")
     assert "smoothed" not in jerk
     assert jerk["change"] == pytest.approx(sum(jerk["by_set"].values()))
@@ -144,10 +144,10 @@ def root(tmp_path_factory):
 
 def test_a_page_names_its_command_without_the_folder_and_can_be_made_again(tmp_path, root, capsys):
     page, again = tmp_path / "constants.md", tmp_path / "again.md"
-    words = ["constants", str(root), "--only", "jerk", "gate", "--steps", "1.4", "--most", "1"]
+    words = ["constants", str(root), "--only", "jerk", "cut_gate", "--steps", "1.4", "--most", "1"]
     assert main([*words, "--jobs", "1", "--page", str(page), "--out", str(tmp_path)]) == 0
     text = page.read_text()
-    assert "`python -m benchmarks constants ROOT --only jerk gate --steps 1.4 --most 1` at commit" in text
+    assert "`python -m benchmarks constants ROOT --only jerk cut_gate --steps 1.4 --most 1` at commit" in text
     assert str(root) not in text
     assert "2 constants are moved" in text
     assert text.count("\n| `") == 2
