@@ -301,6 +301,11 @@ class ModelTracker(Updates, SavedModel):
             self._causal = self._table(with_classes(self._model.rows(), self._classes, self._called), at)
         return self._causal
 
+    def rows_below_least(self) -> int:
+        """Return how many rows of the last step `output.min_existence` left out of the table."""
+        least = self.config.output.min_existence
+        return 0 if least <= self.constants.report else int((self._model.rows()[4] < least).sum())
+
     def predict(self, t: float) -> Prediction:
         """Say where the tracks that are reported now will be at a time; nothing changes.
 
