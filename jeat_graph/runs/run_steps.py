@@ -187,20 +187,19 @@ class RunSteps:
             record.counts["smoothed_rows"] = self._rows["smoothed"]
             record.smoother = {"engine": self._config.smoother.engine, **self._tracker.smoother_counts}
 
-
     def _doubt(self) -> str | None:
         """Return a line if the causal table lacks so much that something must be wrong."""
         rows, left_out, detections = self._rows["causal"], self._rows["below_least"], len(self._detections)
         if left_out > rows:
             least = self._config.output.min_existence
             return (
-                f"output.min_existence={least:g} leaves out {left_out} of {rows + left_out} rows that would be "
-                "reported; with one sensor few tracks exist so surely"
+                f"output.min_existence={least:g} leaves out {left_out} of {rows + left_out} rows that would "
+                "be reported: see the column existence of a run without this setting"
             )
         if detections >= _MANY and rows < _LEAST_TRACKED * detections:
             return (
-                f"{rows} rows of tracks from {detections} detections: nearly all of them are taken for false; "
-                "are the sensors' rates and the picture's size right?"
+                f"{rows} rows of tracks from {detections} detections: nearly all of them are taken for "
+                "false; are the sensors' rates and the picture's size right?"
             )
         return None
 

@@ -222,7 +222,7 @@ class PaperTracker(Updates):
         return self._numbered(replace(table, instants=None if self._t is None else np.array([t])))
 
     def rows_below_least(self) -> int:
-        """Return 0: what is confirmed is taken for a vehicle, so `output.min_existence` leaves out nothing."""
+        """Return how many rows `output.min_existence` left out: none, confirmed tracks have existence 1."""
         return 0
 
     def predict(self, t: float) -> Prediction:
