@@ -175,7 +175,7 @@ def test_undeclared_sensors_are_refused_together_with_the_way_to_declare_them(wr
 def test_the_default_declares_sensors_by_what_is_seen_of_them_and_says_so(write, tmp_path, capsys):
     lines = [line.replace("rgb", "radar") for line in STEADY]
     assert main(["track", write(*lines), "--out", str(tmp_path / "run")]) == 0
-    assert "'radar' is not declared: taken for a detector at 20 Hz" in capsys.readouterr().err
+    assert "'radar' is not declared: taken for a detector; it scans at 20 Hz" in capsys.readouterr().err
     config = run_json(tmp_path / "run")["config"]
     assert config["sensors"].keys() == {"radar"}
     assert config["sensors"]["radar"]["rate_hz"] == pytest.approx(20.0)
