@@ -161,7 +161,8 @@ class ModelTracker(Updates, SavedModel):
                 the sensor looked and found nothing.
 
         Returns:
-            The reported tracks at that time.
+            The reported tracks at that time, no earlier rows: `Trajectories.concatenate` joins those of all
+            steps.
 
         Raises:
             DataError: boxes, scores or embeddings that are not valid, or too many sensors.
@@ -294,7 +295,7 @@ class ModelTracker(Updates, SavedModel):
             sensor_index(scan.sensor, self.sensor_names)
 
     def causal(self) -> Trajectories:
-        """Return the tracks that are reported now, as the last step did."""
+        """Return the tracks that are reported now, as the last step did: not the rows of earlier steps."""
         if self._causal is None:
             now = self.time
             at = None if now is None else np.array([now])
