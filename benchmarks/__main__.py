@@ -49,9 +49,10 @@ KINDS = {
         "pictures and clocks of two cameras brought together by the traffic they saw",
     ),
     "stale": ("benchmarks.stale", "which tables were made by code that has changed since"),
-    "events": (
-        "benchmarks.events",
-        "decoding beside other packages, noise of the event cameras, and what vehicles give",
+    "events": ("benchmarks.events", "decoding and representations of events beside other packages"),
+    "event-cameras": (
+        "benchmarks.event_cameras",
+        "noise of simulated event cameras, and the events of vehicles",
     ),
 }
 

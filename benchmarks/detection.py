@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks import common
-from benchmarks.judging import in_processes
+from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from benchmarks.raw_options import NONE, add_raw, detectors_of, findings
 from benchmarks.raw_segments import SENSORS, RawFound, described, find_in, segments_in

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import common
 from benchmarks.baselines import peers_here
-from benchmarks.judging import METRICS, in_processes
+from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from benchmarks.raw_options import add_raw, detectors_of, findings
 from benchmarks.raw_segments import SENSORS, RawFound, RawSegment, described, find_in, segments_in
 from benchmarks.recordings import JudgedRecording
-from jeat_graph.config.reading import load_config
+from jeat_graph.config.reading import config_to_dict, load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.declared import declared_settings
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 _JOINED_PERIODS = 1.5
 BYTETRACK, PAPER = "ByteTrack", "paper"
 CAUSAL, SMOOTHED = "causal", "smoothed"
+_METRICS = ("MOTA", "MOTP", "HOTA", "IDF1")
 _ALL = "all"
 
 
@@ -113,7 +114,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     }
     return {
         "benchmark": "raw",
-        **provenance(settings, configs),
+        **provenance(settings, {name: config_to_dict(one) for name, one in configs.items()}),
         "sources": list(dict.fromkeys(s.source for s in segments)),
         "records": [record for part in records for record in part],
     }
@@ -172,7 +173,7 @@ def _judge(job: tuple[Row, dict[str, list[JudgedRecording]]]) -> list[dict[str, 
         for kind in tracked[group[0].name]:
             scores = _scores(group, [tracked[one.name][kind] for one in group], row, kind)
             each = [_scores([one], [tracked[one.name][kind]], row, kind) for one in group]
-            spread = {m: stdev([e[m] for e in each]) if len(each) > 1 else 0.0 for m in METRICS}
+            spread = {m: stdev([e[m] for e in each]) if len(each) > 1 else 0.0 for m in _METRICS}
             out.append(
                 {
                     "row": str(row) + (", smoothed" if kind == SMOOTHED else ""),
@@ -264,10 +265,10 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     for one in result["records"]:
         several = one["segments"] > 1
         cell = " / ".join(
-            f"{one['scores'][m]:.1f}" + (f"±{one['std'][m]:.0f}" if several else "") for m in METRICS
+            f"{one['scores'][m]:.1f}" + (f"±{one['std'][m]:.0f}" if several else "") for m in _METRICS
         )
         cells.setdefault(one["row"], {"": one["row"]})[one["source"]] = cell
-    title = f"From raw pictures and events: {' / '.join(METRICS)}, segments pooled (± over segments)"
+    title = f"From raw pictures and events: {' / '.join(_METRICS)}, segments pooled (± over segments)"
     honest: dict[str, dict[str, Cell]] = {
         one["row"]: {
             "": one["row"],

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks import common
-from benchmarks.judging import in_processes
+from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from benchmarks.road_cost import road_costs
 from benchmarks.road_real import LENGTH_SETS, find_brno, judge_camera, speed_scores

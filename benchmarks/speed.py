@@ -159,12 +159,12 @@ def _tables(result: dict[str, Any]) -> str:
 
 def _write(result: dict[str, Any], args: argparse.Namespace) -> None:
     from benchmarks.provenance import provenance
-    from jeat_graph.config.reading import load_config
+    from jeat_graph.config.reading import config_to_dict, load_config
     from jeat_graph.drawing.speed import plot_speed
     from jeat_graph.io.files.atomic import open_atomic
 
     settings = {key: getattr(args, key) for key in ("objects", "frames", "warm_up", "repeats", "clock")}
-    head = provenance(settings, {name: load_config(name) for name in ("default", "paper")})
+    head = provenance(settings, {name: config_to_dict(load_config(name)) for name in ("default", "paper")})
     folder = Path(args.out)
     with open_atomic(folder / "speed.json") as file:
         json.dump({**head, **result}, file, indent=1)

@@ -20,16 +20,16 @@ from benchmarks.judging import (
     SMOOTHED,
     Contender,
     JudgeJob,
-    in_processes,
     judge,
     spread_text,
 )
 from benchmarks.layouts import LayoutOptions, read_sets
 from benchmarks.page import write_page
+from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from benchmarks.recordings import DURATION_S, SEEDS, RecordingSet
 from jeat_graph.config.argument_types import natural, positive
-from jeat_graph.config.reading import load_config
+from jeat_graph.config.reading import config_to_dict, load_config
 from jeat_graph.data.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -128,7 +128,8 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     return {
         "benchmark": args.kind,
         **provenance(
-            settings, {one.name: load_config(one.config or "default", one.changes) for one in subjects}
+            settings,
+            {one.name: config_to_dict(load_config(one.config or "default", one.changes)) for one in subjects},
         ),
         "sets": [_described(group) for group in groups],
         "records": records,
