@@ -1,7 +1,7 @@
 """Which files a module of this checkout imports, directly and through others, read from their text.
 
-Imports inside functions count, those for type checkers alone do not. Names that a package hands on count as the
-module they come from. Of what is compiled, the folders count that are imported, with the headers they
+Imports inside functions count, those for type checkers alone do not. Names that a package hands on count as
+the module that they come from. Of what is compiled, the imported folders count, with the headers that they
 include; the data that a module reads count by folder.
 """
 
