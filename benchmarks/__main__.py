@@ -34,7 +34,8 @@ KINDS = {
     "simulated": (_TABLES, "trackers on simulated highways, streets, squares, and with odd detectors"),
     "detection": ("benchmarks.detection", "how well detectors find vehicles in raw pictures and raw events"),
     "raw": ("benchmarks.raw", "from raw pictures and raw events to tracks"),
-    "road": ("benchmarks.road", "place and speed on the road, simulated and against laser gates"),
+    "road": ("benchmarks.road", "place and speed on simulated roads"),
+    "road-real": ("benchmarks.road_real", "speeds on real highways against laser gates"),
     "speed": ("benchmarks.speed", "time per step, against others"),
     "endurance": (
         "benchmarks.endurance",
