@@ -31,7 +31,10 @@ KINDS = {
     "dsec-mot": (_TABLES, "trackers on DSEC-MOT: events of a driving car"),
     "tumtraf": (_TABLES, "trackers on TUMTraf: cameras over a road, boxes in OpenLABEL"),
     "real": (_TABLES, "trackers on all recordings of a folder"),
-    "simulated": (_TABLES, "trackers on simulated highways, streets, squares, and with odd detectors"),
+    "simulated": (
+        "benchmarks.simulated",
+        "trackers on simulated highways, streets, squares, and with odd detectors",
+    ),
     "detection": ("benchmarks.detection", "how well detectors find vehicles in raw pictures and raw events"),
     "raw": ("benchmarks.raw", "from raw pictures and raw events to tracks"),
     "road": ("benchmarks.road", "place and speed on simulated roads"),

@@ -186,7 +186,7 @@ def test_every_page_of_the_documentation_names_its_commit():
     for page in sorted((ROOT / "docs" / "benchmarks").glob("*.md")):
         for entry in entries_of(page):
             assert entry.commit is not None, f"{entry.page}: {entry.table or 'the page'} names no commit"
-            assert entry.kind in KINDS or entry.kind in stale._COMMANDS
+            assert entry.kind in KINDS
 
 
 def test_rigs_say_how_they_were_made_and_can_be_read_again(tmp_path, monkeypatch, capsys):
