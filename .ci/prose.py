@@ -39,7 +39,7 @@ RULES: tuple[tuple[str, str], ...] = (
     (r"(?<![\w./)\]-])\.\d", "write the zero: 0.6, not .6"),
 )
 #: Made by the build from the code.
-GENERATED = frozenset({"docs/reference/commands.md", "docs/reference/configuration.md"})
+GENERATED = frozenset({"docs/reference/commands.md"})
 _CODE = re.compile(r"```.*?```|`[^`\n]*`|\$\$.*?\$\$|\$[^$\n]*\$|\]\([^)]*\)|<!--.*?-->", re.DOTALL)
 
 

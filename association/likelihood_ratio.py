@@ -5,10 +5,9 @@ Popoli, *Design and Analysis of Modern Tracking Systems*, ch. 6):
 
     ln L = ln P_D/(1 − P_D) + ln p(y) + ln p(score | track)/p(score | clutter) − ln κ
 
-p(y) is Student's t of the four sides, or for a share of boxes that cover a part of the object a wide normal
-one, or where one side is cut that of the other three; κ is the density of leftover boxes: uniform in place
-and in ln width, ln height. Pairs below 0 are never made, and the assignment whose sum is greatest is taken. N
-tracks, M boxes.
+p(y) is Student's t of the four sides, or where one side is cut the density of the other three; κ is the
+density of leftover boxes: uniform in place and in ln width, ln height. Pairs below 0 are never made, and the
+assignment whose sum is greatest is taken. N tracks, M boxes.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import expit, gammaln
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.filters.box_sides import SIDES, SideInnovations, determinant, squared_distance, with_variance
+from jeat_graph.filters.box_sides import SIDES, SideInnovations, determinant, squared_distance
 from jeat_graph.filters.model_constants import ModelConstants
 
 # The probability that a track is detected is kept from 0 and 1, and its posterior from 0: a track of one scan
@@ -33,8 +32,8 @@ _LOG_2PI = math.log(2.0 * math.pi)
 def sides_log_density(innovation: SideInnovations, size: FloatArray, c: ModelConstants) -> FloatArray:
     """Return ln p(y) (N, M), −∞ outside every gate.
 
-    p = (1 − e) t_ν(y; 0, S) + e N(y; 0, S + σ² I) + Σ ε N(three sides) / w, in px⁻⁴, with σ a part of the
-    object's size. The sum is over the sides that an occluder may cut: see `cut_log_density`.
+    p = t_ν(y; 0, S) + Σ ε N(three sides) / w, in px⁻⁴. The sum is over the sides that an occluder may cut:
+    see `cut_log_density`.
 
     Args:
         innovation: of all boxes from all tracks.
@@ -45,15 +44,8 @@ def sides_log_density(innovation: SideInnovations, size: FloatArray, c: ModelCon
     nu = c.degrees_of_freedom
     constant = float(gammaln((nu + SIDES) / 2.0) - gammaln(nu / 2.0) - SIDES / 2.0 * math.log(nu * math.pi))
     body = constant - 0.5 * _log_determinant(S) - (nu + SIDES) / 2.0 * np.log1p(d2 / nu)
-    extra = (c.outlier_std**2 * size.prod(axis=1))[:, None, None]
-    wide = with_variance(S, extra, extra)
-    d2_wide = squared_distance(y, wide).sum(axis=2)
-    constant = -SIDES / 2.0 * math.log(2.0 * math.pi)
-    tail = constant - 0.5 * _log_determinant(wide) - 0.5 * d2_wide
-    share = c.outlier_share
-    whole = np.logaddexp(math.log1p(-share) + body, math.log(share) + tail)
-    whole[np.minimum(d2, c.outlier_gate * d2_wide) > c.gate] = -np.inf
-    return np.asarray(np.logaddexp(whole, cut_log_density(y, S, size, c)))
+    body[d2 > c.gate] = -np.inf
+    return np.asarray(np.logaddexp(body, cut_log_density(y, S, size, c)))
 
 
 def cut_log_density(y: FloatArray, S: FloatArray, size: FloatArray, c: ModelConstants) -> FloatArray:

@@ -35,6 +35,11 @@ KINDS = {
         "benchmarks.simulated",
         "trackers on simulated highways, streets, squares, and with odd detectors",
     ),
+    "ablation": ("benchmarks.ablation", "what each term of the model gains, over all sets"),
+    "constants": (
+        "benchmarks.constants",
+        "which constants of the model matter, and what they reach on a set that they were chosen without",
+    ),
     "detection": ("benchmarks.detection", "how well detectors find vehicles in raw pictures and raw events"),
     "raw": ("benchmarks.raw", "from raw pictures and raw events to tracks"),
     "road": ("benchmarks.road", "place and speed on simulated roads"),
@@ -75,7 +80,7 @@ class _LateParser(Parser):
 
 
 #: Options that say where a result is read or written, and not what it is.
-_PLACES = ("--out", "--readme", "--page", "--from", "--jobs")
+_PLACES = ("--out", "--readme", "--page", "--from", "--jobs", "--cache")
 
 
 def build_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:

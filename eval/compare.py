@@ -11,6 +11,7 @@ from jeat_graph.data.progress import progress_span
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.consistency import consistency
 from jeat_graph.eval.samples import (
+    RECENT_S,
     Samples,
     by_availability,
     by_distance,
@@ -27,6 +28,8 @@ LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)
 
 # Share of the work that judging without truth is, where there is truth too.
 _CONSISTENCY = 0.3
+# What tables call the smoother of whole tracks; its key in the values is `full`.
+_WHOLE = "whole track"
 # What can be said of an estimator by true places alone.
 _OF_PLACES = ("estimator", "position", "position/filter", "ANEES position")
 
@@ -92,7 +95,9 @@ def compare(
             tables.insert(0, _error_table(errors, samples.has_motion))
             tables.append(
                 _group_table(
-                    values["by_availability"], "By sensors that saw the track lately", samples.has_motion
+                    values["by_availability"],
+                    f"By the sensors that detected the track in the last {RECENT_S:g} s",
+                    samples.has_motion,
                 )
             )
             if samples.distance is not None:
@@ -117,13 +122,15 @@ def _error_table(errors: dict[str, dict[str, float]], motion: bool) -> Table:
         if name == lag_name(0.0):
             continue
         record: dict[str, Cell] = {
-            "estimator": name,
+            "estimator": _WHOLE if name == "full" else name,
             "position": one["position_rmse"],
             "velocity": one["velocity_rmse"],
             "acceleration": one["acceleration_rmse"],
             "position/filter": one["position_rmse"] / base["position_rmse"],
             "velocity/filter": one["velocity_rmse"] / base["velocity_rmse"],
             "ANEES position": one["anees_position"],
+            "ANEES velocity": one["anees_velocity"],
+            "ANEES acceleration": one["anees_acceleration"],
             "ANEES state": one["anees_state"],
         }
         records.append(record if motion else {key: record[key] for key in _OF_PLACES})
@@ -139,10 +146,11 @@ def _group_table(groups: Sequence[dict[str, Any]], title: str, motion: bool) -> 
     records: list[dict[str, Cell]] = []
     for one in groups:
         record: dict[str, Cell] = {"group": one["group"], "instants": int(one["filter"]["count"])}
-        for part in ("position", "velocity") if motion else ("position",):
-            for name in ("filter", "full"):
-                record[f"{part} {name}"] = one[name][f"{part}_rmse"]
-        record["ANEES filter"] = one["filter"]["anees_position"]
-        record["ANEES full"] = one["full"]["anees_position"]
+        kinds = ("position", "velocity") if motion else ("position",)
+        columns = [(part, f"{part}_rmse") for part in kinds]
+        columns += [(f"ANEES {part}", f"anees_{part}") for part in kinds]
+        for label, key in columns:
+            record[f"{label}, filter"] = one["filter"][key]
+            record[f"{label}, {_WHOLE}"] = one["full"][key]
         records.append(record)
     return Table.from_records(records, title=f"{title} (RMSE in px{', px/s' if motion else ''})")

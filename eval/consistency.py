@@ -57,9 +57,9 @@ def consistency(tracks: Sequence[FilteredTrack]) -> tuple[dict[str, Any], Table]
         what = f"innovation autocorrelation, {step} step{'s' * (step > 1)}"
         records.append({"check": what, "value": value, "expected": f"±{bound:.3f}"})
     for part, value in values["smoother_filter"].items():
-        what = f"(filter − full)² / (P filter − P full), {part}"
+        what = f"squared change by smoothing / its variance, {part}"
         records.append({"check": what, "value": value, "expected": "1"})
-    return values, Table.from_records(records, title="Consistency without truth", digits={"value": 3})
+    return values, Table.from_records(records, title="Consistency, without ground truth", digits={"value": 3})
 
 
 def whiteness(normalised: Sequence[FloatArray], steps: int = WHITENESS_STEPS) -> FloatArray:

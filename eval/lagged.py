@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.filters.motion import transition
-from jeat_graph.smoothers.filtered_track import MOTION, FilteredTrack
+from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 # Times closer together than this are one (s).
 _COINCIDENT_S = 1e-6
@@ -62,6 +62,6 @@ def last_record(track: FilteredTrack, t: FloatArray) -> IntArray:
 
 def _moved(track: FilteredTrack, states: tuple[FloatArray, FloatArray], ahead: FloatArray) -> States:
     """Move states (T, 2, D) ahead by some time (T,), and leave all but the motion out."""
-    mean, cov = track.motion(states[0]), states[1][:, :, :MOTION, :MOTION]
+    mean, cov = track.motion(states[0]), track.motion_covariance(*states)
     F = np.stack([transition(float(dt)) for dt in ahead])[:, None] if len(ahead) else np.zeros((0, 1, 3, 3))
     return States((F @ mean[..., None])[..., 0], F @ cov @ np.swapaxes(F, -1, -2))

@@ -27,9 +27,9 @@ _SHOWN = {
     "across m": "across_rmse_m",
     "along m": "along_rmse_m",
     "speed km/h": "speed_rmse_kmh",
-    "median km/h": "speed_median_kmh",
-    "nees": "nees",
-    "speed nees": "speed_nees",
+    "median error km/h": "speed_median_kmh",
+    "NEES": "nees",
+    "speed NEES": "speed_nees",
     "held across": "across_held",
     "held along": "along_held",
     "held speed": "speed_held",
@@ -126,7 +126,7 @@ def _tables(values: Mapping[str, Any], config: RoadJudging) -> list[Table]:
     whole = [record(f"{name}, all rows", values[name]) for name in TABLES]
     whole += [record(f"{name}, same rows", values["same_rows"][name]) for name in TABLES]
     span = f"{config.near_m:g} to {config.far_m:g} m"
-    title = f"On the road, {span}: RMSE; NEES should be 1; held: % of the 95 % intervals"
+    title = f"On the road, {span}: RMSE; NEES should be 1; held: % of errors inside the 95 % interval"
     tables = [Table.from_records(whole, title=title, digits=_DIGITS)]
     records: list[dict[str, Cell]] = []
     for one in values["by_distance"]:

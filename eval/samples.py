@@ -150,7 +150,7 @@ def _available(track: FilteredTrack, t: FloatArray) -> IntArray:
 
 
 def errors_of(samples: Samples, name: str, rows: BoolArray | None = None) -> dict[str, float]:
-    """RMSE of each part, and NEES per degree of freedom: of the position, and of the whole state."""
+    """RMSE of each part, and NEES per degree of freedom: of each part, and of the whole state."""
     chosen = np.ones(len(samples), dtype=np.bool_) if rows is None else rows
     state, truth = samples.states[name], samples.truth[chosen]
     error, cov = state.mean[chosen] - truth, state.cov[chosen]
@@ -158,9 +158,10 @@ def errors_of(samples: Samples, name: str, rows: BoolArray | None = None) -> dic
     out: dict[str, float] = {"count": count}
     for part, columns in PARTS.items():
         out[f"{part}_rmse"] = float(np.sqrt((error[:, :, columns] ** 2).sum() / count)) if count else np.nan
-    position = error[:, :, 0] ** 2 / cov[:, :, 0, 0]
+    nees = error**2 / np.diagonal(cov, axis1=2, axis2=3)
+    for k, part in enumerate(PARTS):
+        out[f"anees_{part}"] = float(nees[:, :, k].mean()) if count else np.nan
     whole = (error * np.linalg.solve(cov, error[..., None])[..., 0]).sum(axis=2)
-    out["anees_position"] = float(position.mean()) if count else np.nan
     out["anees_state"] = float(whole.mean() / 3.0) if count else np.nan
     out["anees_low"], out["anees_high"] = chi2_bounds(count, 2)
     return out

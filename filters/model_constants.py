@@ -40,8 +40,6 @@ class ModelConstants:
         uncovered_share: prior probability that one given side was cut so far, and now shows further out.
         most_uncovered: how far out at most (sizes of the part that was known).
         cut_gate: largest squared Mahalanobis distance of the other three sides (χ² of 3, .9998).
-        outlier_share: share of boxes that cover a part of the object, or more than it.
-        outlier_std: standard deviation of a side of these (sizes).
         edge_px: a side that is no further from the edge of the picture lies there (px).
         edge_std: standard deviation of a side that the edge has cut (sizes): 1/√(2π), of which the density at
             0 is one over the size.
@@ -49,8 +47,7 @@ class ModelConstants:
         offset_count: pairs of boxes that the prior of two sensors' mean difference counts for.
         offset_clip: difference from the mean (sizes, or ln size) from which on a pair counts for less.
         offset_age_s: boxes of two sensors that are further apart in time are not compared (s).
-        gate: largest squared Mahalanobis distance of four sides.
-        outlier_gate: factor on the squared distance of an outlier, compared with the gate.
+        gate: largest squared Mahalanobis distance of four sides: so far out that clutter is always likelier.
         clutter_size_area: area in (ln width, ln height) over which the sizes of leftover boxes spread.
         clutter_memory: share of the running mean of leftovers that a scan keeps.
         clutter_prior: leftovers a scan added to that mean.
@@ -155,8 +152,6 @@ class ModelConstants:
     cut_gate: float = 20.0
     uncovered_share: float = 0.0002
     most_uncovered: float = 4.0
-    outlier_share: float = 0.2
-    outlier_std: float = 0.3
 
     edge_px: float = 3.0
     edge_std: float = 0.4
@@ -165,8 +160,7 @@ class ModelConstants:
     offset_clip: float = 0.2
     offset_age_s: float = 0.011
 
-    gate: float = 60.0
-    outlier_gate: float = 6.0
+    gate: float = 150.0
     clutter_size_area: float = 2.0
     clutter_memory: float = 0.98
     clutter_prior: float = 0.5

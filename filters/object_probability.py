@@ -3,8 +3,7 @@
 - *real*: an object. Each sensor either sees it, with a P_D of its own (Beta), or never does (share g), or
   not while it stands (share b of the rest), as an event camera.
 - *persistent false object of sensor s*: what s takes for one again and again, a window or a sign. s finds it
-as it
-  finds objects; every other sensor finds it by chance, or (share c) has it in common.
+  as it finds objects; every other sensor finds it by chance, or (share c) has it in common.
 - *noise*: boxes of the moment. Every later detection where a track predicts it speaks against it.
 - *second box* of another track: no hypothesis of its own but a term in the odds of "real".
 

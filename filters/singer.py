@@ -168,16 +168,46 @@ def in_perspective(F: FloatArray, mean: FloatArray, dt: float, c: ModelConstants
     return out
 
 
-def told_motion(mean: FloatArray) -> FloatArray:
-    """Return what tables tell of states (N, 2, 7): the motion (N, 2, 5) of the box as detectors have it.
+def told_motion(mean: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return what tables tell of states (..., 2, 7): the motion (..., 2, 5) of the box as detectors have it.
 
-    What lasts of their errors is in it: smoothed, a box without that follows the model's errors instead of
-    its own (position's RMSE 3.1 px and with it 2.1 px on simulated roads). Variances stay the object's.
+    What lasts of the detectors' errors is in place and size: smoothed, a box without that follows the model's
+    errors instead of its own (position's RMSE 3.1 px and with it 2.1 px on simulated roads). The
+    acceleration is that of the centre in the picture, dv/dt = a + (2 g − 1/τ_v) v with g the mean growth
+    rate of both axes: a alone is what neither perspective nor damping explains. A camera's measured velocity
+    counts as the track's own here.
     """
     out = mean[..., :MOTION].copy()
     out[..., POSITION] += mean[..., POSITION_ERROR]
     out[..., LOG_SIZE] += mean[..., SIZE_ERROR]
+    out[..., ACCELERATION] += _acceleration_by_velocity(mean, c) * mean[..., VELOCITY]
     return out
+
+
+def told_covariance(mean: FloatArray, covariance: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return the covariance (..., 2, 5, 5) of what `told_motion` tells.
+
+    J P Jᵀ with the derivatives of the acceleration, 2 g − 1/τ_v by v, 1 by a and v by r, plus v² Var(r) of
+    the other axis, from which half of g comes. Place and size vary as those of the object do.
+
+    Args:
+        mean: (..., 2, 7) states.
+        covariance: (..., 2, 7, 7).
+        c: constants.
+    """
+    out = covariance[..., :MOTION, :MOTION].copy()
+    v = mean[..., VELOCITY, None]
+    by_velocity = _acceleration_by_velocity(mean, c)[..., None]
+    row = out[..., ACCELERATION, :] + by_velocity * out[..., VELOCITY, :] + v * out[..., GROWTH, :]
+    own = row[..., ACCELERATION] + by_velocity[..., 0] * row[..., VELOCITY] + v[..., 0] * row[..., GROWTH]
+    out[..., ACCELERATION, :] = out[..., :, ACCELERATION] = row
+    out[..., ACCELERATION, ACCELERATION] = own + v[..., 0] ** 2 * covariance[..., ::-1, GROWTH, GROWTH]
+    return out
+
+
+def _acceleration_by_velocity(mean: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return ∂v̇/∂v = 2 g − 1/τ_v (..., 1) of states (..., 2, 7)."""
+    return np.asarray(2.0 * mean[..., GROWTH].mean(axis=-1, keepdims=True) - 1.0 / c.velocity_time_s)
 
 
 def lasting_error(size: FloatArray, log_variance: float, c: ModelConstants) -> tuple[FloatArray, FloatArray]:

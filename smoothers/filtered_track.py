@@ -8,8 +8,9 @@ fitted: with d = m − m⁻ of an update the covariance of d is P⁻ − P, sinc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,18 @@ from jeat_graph.smoothers.state_rts import FilterRecord
 MOTION = 3
 # An update that gains less of the variance than this has measured nothing.
 _LEAST_GAIN = 1e-9
+
+
+class Output(NamedTuple):
+    """How place, velocity and acceleration follow from a track's states.
+
+    Attributes:
+        mean: from means (..., A, D), those of the three (..., A, 3).
+        covariance: from means and covariances (..., A, D, D), that of the three (..., A, 3, 3).
+    """
+
+    mean: Callable[[FloatArray], FloatArray]
+    covariance: Callable[[FloatArray, FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +48,7 @@ class FilteredTrack:
         mean: (K, A, D) after it.
         covariance: (K, A, D, D).
         sensor: (K,) index of the sensor whose box was taken in, −1 where none was.
-        output: (3, D) what of a state is told as place, velocity and acceleration; None: its first three.
+        output: what is told as place, velocity and acceleration; None: the first three of a state.
     """
 
     track_id: int
@@ -46,14 +59,20 @@ class FilteredTrack:
     mean: FloatArray
     covariance: FloatArray
     sensor: IntArray
-    output: FloatArray | None = None
+    output: Output | None = None
 
     def __len__(self) -> int:
         return len(self.t)
 
     def motion(self, mean: FloatArray) -> FloatArray:
         """Return what is told (..., 3) of states (..., D): place, velocity and acceleration."""
-        return mean[..., :MOTION] if self.output is None else np.asarray(mean @ self.output.T)
+        return mean[..., :MOTION] if self.output is None else self.output.mean(mean)
+
+    def motion_covariance(self, mean: FloatArray, covariance: FloatArray) -> FloatArray:
+        """Return the covariance (..., A, 3, 3) of what is told of states (..., A, D) with theirs."""
+        if self.output is None:
+            return covariance[..., :MOTION, :MOTION]
+        return self.output.covariance(mean, covariance)
 
     def normalised_innovations(self) -> tuple[IntArray, FloatArray]:
         """Return the updates (M,) that measured something, and by how much they moved the place (M, A).
@@ -132,10 +151,10 @@ def tracks_of(
     ids = np.concatenate([one.track_id for one in records])
     order = np.argsort(ids, kind="stable")
     axes = records[0].mean.shape[1]
-    columns = {
-        name: np.concatenate([getattr(one, name) for one in records])[order]
+    before, before_cov, after, after_cov = (
+        np.concatenate([getattr(one, name) for one in records])[order]
         for name in ("predicted_mean", "predicted_covariance", "mean", "covariance")
-    }
+    )
     F = np.concatenate([np.broadcast_to(one.F, (len(one.F), axes, *one.F.shape[2:])) for one in records])[
         order
     ]
@@ -144,6 +163,6 @@ def tracks_of(
     out = []
     for a, b in zip(starts, [*starts[1:], len(order)], strict=True):
         rows = slice(int(a), int(b))
-        own = {name: column[rows] for name, column in columns.items()}
-        out.append(FilteredTrack(int(ids[order[a]]), times[rows], F[rows], sensor=sensor[rows], **own))
+        states = before[rows], before_cov[rows], after[rows], after_cov[rows]
+        out.append(FilteredTrack(int(ids[order[a]]), times[rows], F[rows], *states, sensor[rows]))
     return out

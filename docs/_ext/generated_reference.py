@@ -1,4 +1,8 @@
-"""Pages of the reference made from the code: commands from their parsers, settings from the schema."""
+"""Pages of the reference made from the code: commands from their parsers, settings from the schema.
+
+The build of the documentation writes both, and so does `python docs/_ext/generated_reference.py`. That of the
+settings is kept in the repository, for those who read the pages there.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,10 @@ import argparse
 import dataclasses
 import io
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import TYPE_CHECKING, Any, get_type_hints
 
-from sphinx.application import Sphinx
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 _WIDTH = 96
 #: Columns of the page of settings.
@@ -158,8 +163,12 @@ def _shown(value: Any) -> str:
     return f"`{value:.15g}`" if isinstance(value, float) else f"`{value}`"
 
 
-def _write(app: Sphinx) -> None:
-    folder = Path(app.srcdir) / "reference"
+def write_pages(folder: Path) -> None:
+    """Write both pages, where they have changed.
+
+    Args:
+        folder: that of the reference.
+    """
     for name, text in (("commands.md", commands_page()), ("configuration.md", configuration_page())):
         path = folder / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:
@@ -168,5 +177,9 @@ def _write(app: Sphinx) -> None:
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Write the pages before Sphinx looks for its sources."""
-    app.connect("builder-inited", _write)
+    app.connect("builder-inited", lambda app: write_pages(Path(app.srcdir) / "reference"))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+if __name__ == "__main__":
+    write_pages(Path(__file__).parents[1] / "reference")

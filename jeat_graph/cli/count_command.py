@@ -23,7 +23,7 @@ from jeat_graph.cli.options import add_classes, add_tables, tables_read
 from jeat_graph.cli.place_options import add_places, places
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
-from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.eval.counting import Count, Line, LineCrossing
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--od",
         metavar="FILE",
-        help="also write how many vehicles went from which line or zone to which, as CSV",
+        help="also write how many vehicles went from which line or zone to which, as CSV; needs two at "
+        "least, say --lines marks.yaml --od od.csv",
     )
     add(
         "--stations",
@@ -99,11 +100,8 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.tables.trajectories_io import read_trajectories
 
     lines, zones = places(args)
-    if not lines and not zones:
-        raise ConfigError("nothing to count at: give --line, --zone or --lines FILE.yaml")
     names = [line.name for line in lines] + [zone.name for zone in zones]
-    if args.road is not None and args.stations is None and args.datex is None:
-        raise ConfigError("--road says nothing without --stations: give both, or leave it out")
+    _check_places(args, len(lines), len(names))
     publication = _publication(args)
     later_s = clock_s(args.begin)
     tables = tables_of(Path(args.source))
@@ -143,6 +141,26 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _check_places(args: argparse.Namespace, lines: int, places: int) -> None:
+    """Refuse what needs more lines or zones than there are, before anything is read or written.
+
+    Raises:
+        ConfigError: says what is missing.
+    """
+    if not places:
+        raise ConfigError("nothing to count at: give --line, --zone or --lines FILE.yaml")
+    if args.od is not None and places < 2:
+        raise ConfigError(
+            "--od counts ways from one line or zone to another, and there is only one: name another with "
+            "--line, --zone or --lines FILE.yaml; how many met this one is counted without --od"
+        )
+    if not lines and (args.stations is not None or args.datex is not None):
+        option = "--stations" if args.stations is not None else "--datex"
+        raise ConfigError(f"{option} is of lines: give --line, or --lines FILE.yaml with some")
+    if args.road is not None and args.stations is None and args.datex is None:
+        raise ConfigError("--road says nothing without --stations: give both, or leave it out")
+
+
 def _edges(interval_s: float | None, span: tuple[float, float], found: list[LineCrossing]) -> FloatArray:
     from jeat_graph.eval.counting import interval_edges
 
@@ -159,8 +177,6 @@ def _write_od(
     from jeat_graph.eval.zones import OdCount, journeys, od_table
     from jeat_graph.io.tables.table_writer import write_columns
 
-    if len(names) < 2:
-        raise DataError("--od needs two lines or zones at least")
     rows = od_table(journeys(found), edges, names)
     write_columns(with_clock(_columns(rows, OdCount), args.begin), args.od)
 
@@ -191,8 +207,6 @@ def _stations(
     from jeat_graph.cli.count_output import on_road
     from jeat_graph.eval.stations import covered_s, stations
 
-    if not lines:
-        raise DataError("--stations is of lines: give --line, or --lines FILE.yaml with some")
     by_name = {line.name: line for line in lines}
     covers = [covered_s(table, by_name[c.line], c) for c in at_lines]
     lanes, speeds = (None, None) if road is None else on_road(Path(road), at_lines)

@@ -127,7 +127,7 @@ def _said_of_place(place: PlaceStory, at: tuple[float, float, float], form: str)
     where = f"at t = {t:g} s, ({x:g}, {y:g}) px"
     if not place.boxes and not place.tracks:
         return [f"{where} no sensor has a box, and no track is there"]
-    lines = [f"{where}: {len(place.boxes)} boxes of sensors, {len(place.tracks)} tracks"]
+    lines = [f"{where}: boxes of sensors: {len(place.boxes)}, tracks: {len(place.tracks)}"]
     if place.boxes:
         boxes: list[dict[str, Cell]] = [
             {"t": one.t, "sensor": one.sensor, "score": one.score, "went to track": one.taker}

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from jeat_graph.data.picture_map import PictureMap
     from jeat_graph.rig.pattern import Corners, Pattern, PatternPlace, Picture
 
-_PICTURES = (".png", ".jpg", ".jpeg", ".bmp")
 _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v")
 # Pictures that are looked at of a video or of events in which the pattern stands still, and how long events
 # are counted for each (µs).
@@ -160,6 +159,7 @@ def _one_size(views: Sequence[_Seen]) -> tuple[int, int]:
 
 def _look(path: str, pattern: Pattern, size_px: tuple[int, int] | None) -> Iterator[_Seen]:
     """Corners of each place that a path shows; the size is for files of events that do not say theirs."""
+    from jeat_graph.io.media.decoders import PICTURES
     from jeat_graph.io.media.picture_file import read_picture
     from jeat_graph.io.media.video import open_frames
     from jeat_graph.rig.pattern import corners_of_place
@@ -170,7 +170,7 @@ def _look(path: str, pattern: Pattern, size_px: tuple[int, int] | None) -> Itera
             for k in range(len(frames)):
                 where = f"{path}, picture {k + 1}"
                 yield _Seen(where, frames.size_px, corners_of_place([frames.frame(k)], pattern, where))
-    elif suffix in _PICTURES:
+    elif suffix in PICTURES:
         picture = read_picture(path)
         size = (picture.shape[1], picture.shape[0])
         yield _Seen(path, size, corners_of_place([picture[..., ::-1]], pattern, path))

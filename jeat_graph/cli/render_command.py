@@ -156,10 +156,11 @@ def run(args: argparse.Namespace) -> int:
         movie, rate_hz, warnings = open_movie(request, stack)
         for warning in warnings:
             warn("render", warning)
+        codec = None
         if one:
             write_png(out, movie.strip(args.strip or 1))
         else:
-            _write_movie(movie, rate_hz, out, args.codec)
+            codec = _write_movie(movie, rate_hz, out, args.codec)
     count, (width, height) = min(len(movie.times), args.strip or len(movie.times)), movie.size_px
     if args.rate is not None and not _counted(request):
         warn(
@@ -167,7 +168,8 @@ def run(args: argparse.Namespace) -> int:
             "--rate was not needed: nothing here counts frames (pictures per second of the film: "
             "--output-rate)",
         )
-    print(f"wrote {out}: {count} picture{'s' * (count != 1)} of {width} x {height} px")
+    written = "" if codec is None else f" ({codec})"
+    print(f"wrote {out}: {count} picture{'s' * (count != 1)} of {width} x {height} px{written}")
     return 0
 
 
@@ -179,7 +181,8 @@ def _counted(request: Request) -> bool:
     return request.frames is not None or any(map(counts_frames, files))
 
 
-def _write_movie(movie: Movie, rate_hz: float, out: Path, kind: str) -> None:
+def _write_movie(movie: Movie, rate_hz: float, out: Path, kind: str) -> str:
+    """Write all pictures; as what, in words."""
     from tqdm import tqdm
 
     from jeat_graph.drawing.movie.film import MovieWriter
@@ -188,6 +191,7 @@ def _write_movie(movie: Movie, rate_hz: float, out: Path, kind: str) -> None:
     with MovieWriter(out, movie.size_px, rate_hz, kind) as writer:
         for k in tqdm(range(len(movie.times)), desc="render", unit="frame", disable=hidden, leave=False):
             writer.append(movie.picture(k))
+    return writer.codec
 
 
 def _check_out(out: Path, one: bool) -> None:

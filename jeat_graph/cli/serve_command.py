@@ -11,10 +11,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of the command."""
     parser.description = HELP + (
         ". It says what happens as lines of JSON on stderr, and ends on SIGTERM with all in order. Example: "
-        "jeat-graph serve gantry7.yaml"
+        "jeat-graph serve --set-aside-damaged gantry7.yaml"
     )
     parser.add_argument("service", metavar="CONFIG.yaml", help="the file; docs/guides/service.md explains it")
     parser.add_argument("--check", action="store_true", help="only read the file and say whether it is valid")
+    parser.add_argument(
+        "--set-aside-damaged",
+        action="store_true",
+        help="rename a checkpoint that is damaged (FILE.damaged-1, …), warn, and begin anew, as the unit of "
+        "systemd does (default: refuse it, exit code 2)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -30,4 +36,4 @@ def run(args: argparse.Namespace) -> int:
     if args.check:
         print(f"{args.service}: valid: {len(config.sources)} sources, {len(config.sinks)} sinks")
         return 0
-    return Service(config, log).run()
+    return Service(config, log, sets_aside_damaged=args.set_aside_damaged).run()

@@ -195,21 +195,22 @@ def _rmse_against_lag(plt: Any, comparison: Comparison) -> Figure:
         full, base = errors["full"][f"{part}_rmse"], errors["filter"][f"{part}_rmse"]
         axis.plot(lags, value, color=FULL, lw=2.0, marker="o", ms=4)
         axis.axhline(full, color=TRUTH, lw=1.0, ls="--")
-        below = f"whole track {full:.3g} {unit} ({100.0 * full / base:.0f} % of the filter's)"
+        above = full > base  # on the side of the line that the filter's point is not on
+        text = f"whole track {full:.3g} {unit} ({100.0 * full / base:.0f} % of the filter's)"
         axis.annotate(
-            below,
+            text,
             (1.0, full),
             xycoords=("axes fraction", "data"),
-            xytext=(0, -5),
+            xytext=(0, 5 if above else -5),
             textcoords="offset points",
             ha="right",
-            va="top",
+            va="bottom" if above else "top",
             fontsize=9,
         )
         axis.annotate(
             f"filter {base:.3g} {unit}",
             (lags[0], value[0]),
-            xytext=(8, 0),
+            xytext=(8, -8 if above else 0),
             textcoords="offset points",
             va="center",
             fontsize=9,

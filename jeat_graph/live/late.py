@@ -136,13 +136,7 @@ class LiveTracker:
         given = [self._corrected(self._common.scan(scan)) for scan in given]
         batch = [self._on_common_clock(scan) for scan in given]
         self.measured = []
-        repeated, new = self._repetition.sort(batch, self._was_taken, given)
-        # What by its time was taken and by its content never came is too late, and clocks are compared by it.
-        late = [
-            scan
-            for scan, own in zip(batch, given, strict=True)
-            if scan in repeated and self._repetition.never_came(own)
-        ]
+        repeated, late, new = self._repetition.sort(batch, given, self._was_taken)
         released = Released([new] if new else [], [])
         if self._room is not None:
             released = self._room.enter(new, self._base.bound_s)
@@ -155,7 +149,6 @@ class LiveTracker:
         if news is not None and news.taken_off:
             news.lines.extend(self._wait_for(news))
         waiting = [] if self._room is None else [scan for scan in new if self._room.holds(scan)]
-        repeated = [scan for scan in repeated if scan not in late]
         return self._arrival(admitted, repeated)._replace(waiting=waiting, missed=missed, clocks=news)
 
     def _admit(self, scans: list[Scan]) -> Admitted:

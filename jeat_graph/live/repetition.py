@@ -39,29 +39,30 @@ class Repetition:
         self.first: float | None = None
 
     def sort(
-        self,
-        scans: Sequence[Scan],
-        was_taken: Callable[[Scan], bool],
-        given: Sequence[Scan] | None = None,
-    ) -> tuple[list[Scan], list[Scan]]:
-        """Sort scans into those that come again and those that are new.
+        self, scans: Sequence[Scan], given: Sequence[Scan], was_taken: Callable[[Scan], bool]
+    ) -> tuple[list[Scan], list[Scan], list[Scan]]:
+        """Sort scans into those that come again, those that are too late, and those that are new.
 
         Args:
             scans: of one message.
-            was_taken: whether the tracker has taken a scan of that sensor and of a time up to `until`.
             given: the same with their sensors' own times, where others were found meanwhile.
+            was_taken: whether the tracker has taken a scan of that sensor and of a time up to `until`.
+
+        Returns:
+            What had been taken; what by its time was taken and by its content never came; all others.
         """
         again: list[Scan] = []
+        late: list[Scan] = []
         new: list[Scan] = []
-        for scan, as_given in zip(scans, scans if given is None else given, strict=True):
-            (again if self._comes_again(scan, as_given, was_taken) else new).append(scan)
-        if again:  # what was passed over before the restart is so once more
+        for scan, as_given in zip(scans, given, strict=True):
+            known = None if self.until is None else self._memory.knows(fingerprint_of(as_given))
+            if not self._comes_again(scan, known, was_taken):
+                new.append(scan)
+            else:
+                (late if known is False else again).append(scan)
+        if again or late:  # what was passed over before the restart is so once more
             del self._base.row[self._kept :]
-        return again, new
-
-    def never_came(self, scan: Scan) -> bool:
-        """Whether a scan, with its sensor's own time, has certainly not come before."""
-        return self._memory.knows(fingerprint_of(scan)) is False
+        return again, late, new
 
     def note(self, scans: Sequence[Scan]) -> None:
         """Take note of scans that have come, with their sensors' own times."""
@@ -74,10 +75,9 @@ class Repetition:
         if first is not None:
             self.first = first
 
-    def _comes_again(self, scan: Scan, given: Scan, was_taken: Callable[[Scan], bool]) -> bool:
+    def _comes_again(self, scan: Scan, known: bool | None, was_taken: Callable[[Scan], bool]) -> bool:
         if self.until is None:
             return False
-        known = self._memory.knows(fingerprint_of(given))
         if known:
             self._never = 0
             return True

@@ -55,7 +55,7 @@ class RowsEnd(Protocol):
         """Add rows."""
 
     def flush(self) -> int:
-        """Hand all rows on; how much there is by now, for whoever goes on from a checkpoint."""
+        """Begin anew elsewhere if that is due; how much there is by now, which a checkpoint keeps."""
 
 
 @dataclass
@@ -193,6 +193,8 @@ class Session:
         """Write the smoothed rows that are final."""
         if self.ends.smoothed is not None:
             self.ends.smoothed.append(self.live.drain_smoothed())
+            if self._checkpoint is None:  # with one, a new file begins where it says so
+                self.ends.smoothed.flush()
 
     def save(self) -> None:
         """Write the checkpoint, if one is wanted, and tell the source.

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
-from typing import BinaryIO, Self
+from typing import Self
 
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import DataError, InputWarning
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.io.files.growing import GrowingFile
 from jeat_graph.io.streams.track_lines import csv_header, csv_rows
+
+_HEADS = tuple(csv_header(classes).encode() for classes in (False, True))
 
 
 class SmoothedFile:
@@ -15,35 +19,44 @@ class SmoothedFile:
 
     Unlike the tables of a run directory it is there from the beginning: whoever reads it sees what is final
     by then, and an end of the process at any moment costs nothing that was final. Its header is written with
-    the first answer of the tracker (`begin`), which shows whether there are classes.
+    the first answer of the tracker (`begin`), which shows whether there are classes. Where it is moved away,
+    a new one begins with the next `flush`, which is that of a checkpoint: so a checkpoint is of one file.
 
     Args:
         path: the file; replaced, or with `keep_bytes` gone on with.
-        keep_bytes: how many bytes of it to keep, from a checkpoint; what came after them comes again.
+        keep_bytes: how many bytes of it to keep, from a checkpoint; what came after them comes again. If it
+            has no rows now, it was moved away since: a new one begins, with a warning.
 
     Raises:
-        DataError: it is a folder, or shorter than what is to be kept.
+        DataError: it is a folder, or has rows, but is shorter than what is to be kept.
     """
 
     def __init__(self, path: str | Path, keep_bytes: int | None = None) -> None:
         self._path = Path(path)
         if self._path.is_dir():
             raise DataError("is a folder; --smoothed must name a file", path)
-        size = self._path.stat().st_size if self._path.is_file() else 0
-        if keep_bytes is not None and size < keep_bytes:
-            raise DataError(f"has {size} bytes, and had {keep_bytes} when the checkpoint was written", path)
-        self._keep = keep_bytes or None  # a file without a header has nothing to be kept
+        self._keep = keep_bytes or 0
         self._classes: bool | None = None
+        size = self._path.stat().st_size if self._path.is_file() else 0
+        if size >= self._keep:
+            return
+        if has_rows(self._path):
+            raise DataError(f"has {size} bytes, and had {keep_bytes} when the checkpoint was written", path)
+        self._keep = 0
+        warnings.warn(
+            f"{path}: was moved away after the checkpoint; rows since then are in both files",
+            InputWarning,
+            stacklevel=2,
+        )
 
     def __enter__(self) -> Self:
-        if self._keep is None:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            self._file: BinaryIO = self._path.open("wb")
-        else:
-            self._file = self._path.open("r+b")
-            self._classes = self._file.readline() == csv_header(classes=True).encode()
-            self._file.truncate(self._keep)
-            self._file.seek(self._keep)
+        head = b""
+        if self._keep:  # one without a header has nothing to be kept
+            with self._path.open("rb") as file:
+                head = file.readline()
+        self._file = GrowingFile(self._path, self._keep)
+        if head:
+            self.begin(head == _HEADS[True])
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -58,17 +71,22 @@ class SmoothedFile:
         """
         if self._classes is None:
             self._classes = classes
-            self._file.write(csv_header(classes).encode())
-            self._file.flush()
+            self._file.begin(_HEADS[classes])
 
     def append(self, table: Trajectories) -> None:
         """Add rows, and hand them to the system at once."""
         if len(table):
             self.begin(table.classes is not None)
             self._file.write(csv_rows(table, bool(self._classes)).encode())
-            self._file.flush()
 
     def flush(self) -> int:
-        """Hand all rows to the system; how many bytes the file has."""
-        self._file.flush()
-        return self._file.tell()
+        """Go on in a new file if this one was moved away; how many bytes the file has."""
+        return self._file.follow()
+
+
+def has_rows(path: str | Path) -> bool:
+    """Whether a table is there that holds more than a header."""
+    if not Path(path).is_file():
+        return False
+    with Path(path).open("rb") as file:
+        return file.read(max(map(len, _HEADS)) + 1) not in (b"", *_HEADS)

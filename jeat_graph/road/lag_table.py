@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.io.files.growing import GrowingFile
 from jeat_graph.io.tables.table_writer import csv_lines
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal import CalibrationShare, columns_of_rows
@@ -74,7 +75,7 @@ class RoadFile:
     A track has rows from when it has been reported: what never was has none.
 
     Args:
-        path: the file, which is replaced.
+        path: the file, which is replaced; where it is moved away, a new one begins.
         table: gives the rows.
 
     Raises:
@@ -89,10 +90,8 @@ class RoadFile:
             raise DataError("is a folder; --road must name a file", path)
 
     def __enter__(self) -> Self:
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        self._file: BinaryIO = self._path.open("wb")
-        self._file.write((",".join(empty_road_columns()) + "\n").encode())
-        self._file.flush()
+        self._file = GrowingFile(self._path)
+        self._file.begin((",".join(empty_road_columns()) + "\n").encode())
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -120,5 +119,5 @@ class RoadFile:
     def _append(self, columns: Columns) -> None:
         known = np.array([k in self._reported for k in columns["track_id"].tolist()], dtype=np.bool_)
         if known.any():
+            self._file.follow()
             self._file.write(csv_lines({name: values[known] for name, values in columns.items()}).encode())
-            self._file.flush()

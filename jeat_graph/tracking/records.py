@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,15 +16,13 @@ from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import singer
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.smoothers.filtered_track import FilteredTrack, tracks_of
+from jeat_graph.smoothers.filtered_track import FilteredTrack, Output, tracks_of
 from jeat_graph.smoothers.state_rts import FilterRecord
 from jeat_graph.tracking.measured import ConfirmedMeasurements
 from jeat_graph.tracking.model_tracker import PendingStep
 from jeat_graph.tracking.tracker import Tracker
 
 _MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
-# Place, velocity and acceleration as tables tell them (`singer.told_motion`).
-_OUTPUT = np.stack([singer.told_motion(np.eye(singer.STATES))[:, k] for k in _MOTION])
 
 
 def record_tracks(
@@ -62,7 +61,17 @@ def record_tracks(
     reported = set(causal.track_id.tolist())
     whole = [one for one in found if one.track_id in reported]
     F = [_transitions(one, tracker.constants) for one in whole]
-    return [replace(one, F=steps, output=_OUTPUT) for one, steps in zip(whole, F, strict=True)], causal
+    output = Output(partial(_told, c=tracker.constants), partial(_told_covariance, c=tracker.constants))
+    return [replace(one, F=steps, output=output) for one, steps in zip(whole, F, strict=True)], causal
+
+
+def _told(mean: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return place, velocity and acceleration (..., 2, 3) of states (..., 2, 7) as tables tell them."""
+    return singer.told_motion(mean, c)[..., _MOTION]
+
+
+def _told_covariance(mean: FloatArray, covariance: FloatArray, c: ModelConstants) -> FloatArray:
+    return singer.told_covariance(mean, covariance, c)[..., _MOTION, :][..., _MOTION]
 
 
 def record_measurements(

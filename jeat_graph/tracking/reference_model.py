@@ -13,7 +13,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import gap_survival, sensor_offsets
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.picture_motion import PictureMotion
-from jeat_graph.filters.singer import MOTION, STATES, told_motion
+from jeat_graph.filters.singer import MOTION, STATES, told_covariance, told_motion
 from jeat_graph.smoothers.state_rts import FilterRecord, smooth
 from jeat_graph.tracking.reference import step
 from jeat_graph.tracking.reference_life import begin_anew
@@ -153,7 +153,7 @@ class ReferenceModel:
         scale = [np.full(len(one), value) for one, value in zip(done.nis, done.noise_scale, strict=True)]
         nothing = np.zeros(0)
         self._answer = Answer(
-            _rows(t, told.track_id, told.mean, told.covariance, told.real, told.used),
+            _rows(t, told.track_id, told.mean, told.covariance, told.real, told.used, self.constants),
             (told.mean.reshape(-1, 2 * STATES), told.covariance.reshape(-1, 2 * STATES**2)),
             np.concatenate([*done.takers, np.zeros(0, np.int64)]),
             tracks.track_id,
@@ -305,7 +305,7 @@ class ReferenceModel:
                 rows = real > c.report
                 state = mean[rows], covariance[rows], real[rows], moment.used[rows]
                 called = [self._called[track] for track in moment.track_id[rows].tolist()]
-                parts.append(_rows(moment.t, moment.track_id[rows], *state, called))
+                parts.append(_rows(moment.t, moment.track_id[rows], *state, c, called))
         return _joined(parts[::-1])
 
     def _last_seen_by_moment(self) -> list[FloatArray]:
@@ -369,11 +369,12 @@ def _rows(
     covariance: FloatArray,
     real: FloatArray,
     used: IntArray,
+    c: ModelConstants,
     called: Sequence[Called] | None = None,
 ) -> ModelRows:
     """Return tracks (N,) at one time."""
-    variance = np.diagonal(covariance, axis1=2, axis2=3)
-    flat = told_motion(mean).reshape(-1, _WIDTH), variance[..., :MOTION].reshape(-1, _WIDTH)
+    variance = np.diagonal(told_covariance(mean, covariance, c), axis1=2, axis2=3)
+    flat = told_motion(mean, c).reshape(-1, _WIDTH), variance.reshape(-1, _WIDTH)
     if called is None:
         called = [Called(track, -1, 0.0) for track in ids.tolist()]
     given, label = (np.array([one[k] for one in called], dtype=np.int64) for k in (0, 1))

@@ -11,7 +11,7 @@ from benchmarks.baselines import peers_here
 from benchmarks.judging import LEFT_OUT, MOVED, Contender, JudgeJob, altered, judge, spread_text
 from benchmarks.processes import in_processes
 from benchmarks.recordings import RecordingSet
-from benchmarks.simulated import simulated
+from benchmarks.simulated_sets import simulated
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import re
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -38,6 +40,23 @@ def test_it_prints_tables_and_writes_json_and_pictures(folder, shown):
     for name in ("trajectories", "error-over-time", "rmse-against-lag"):
         assert (folder / "out" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert b"<svg" in (folder / "out" / f"{name}.svg").read_bytes()
+
+
+def test_the_guide_explains_each_column_of_the_errors_and_each_check(shown):
+    guide = (Path(__file__).parents[2] / "docs" / "guides" / "evaluation.md").read_text(encoding="utf-8")
+    errors, checks, *_ = shown.split("\n\n")
+    rows = [re.split(r"  +", line.strip()) for line in errors.splitlines() if "─" not in line]
+    # Title, names of the columns, filter, lags, whole track.
+    assert [rows[2][0], rows[-1][0]] == ["filter", "whole track"]
+    columns = rows[1][1:]
+    assert len(columns) >= 7
+    rules = [re.split(r"  +", line)[0] for line in checks.splitlines()[3:]]
+    rules = [
+        re.sub(r", \d steps?$", ", k steps", re.sub(r", (position|velocity|acceleration)$", "", r))
+        for r in rules
+    ]
+    assert len(set(rules)) == 3
+    assert [name for name in {*columns, *rules} if f"`{name}`" not in guide] == []
 
 
 def test_without_truth_it_judges_consistency(folder, capsys):

@@ -228,7 +228,10 @@ def test_stations_as_measured_data_of_datex_ii(run, tmp_path, monkeypatch):
         (["--zone", "a=1,2,x"], "must read x1,y1"),
         (["--line", "a=0,0,1,1", "--zone", "a=0,0,1,1,2,0"], "a is the name of two lines or zones"),
         (["--line", "0,0,1,1", "--begin", "yesterday"], "--begin yesterday: must be a date and time"),
-        (["--line", "0,0,1,1", "--od", "od.csv"], "--od needs two lines or zones"),
+        (
+            ["--line", "0,0,1,1", "--od", "od.csv"],
+            "--od counts ways from one line or zone to another, and there is only one",
+        ),
         (["--zone", "0,0,1,1,2,0", "--stations", "s.csv"], "--stations is of lines"),
         (
             ["--line", "0,0,1,1", "--datex", "d.xml"],
@@ -252,3 +255,11 @@ def test_what_cannot_be_counted_is_one_clear_line(run, tmp_path, monkeypatch, fa
     (tmp_path / "marks.yaml").write_text("masks: {sky: [[0, 0], [9, 0], [9, 9]]}\n")
     assert words in fails("count", str(run), *more)
     assert not list(tmp_path.glob("o*.csv"))
+
+
+@pytest.mark.parametrize("needs", [("--line", "0,0,1,1", "--od"), ("--zone", "0,0,1,1,2,0", "--stations")])
+def test_too_few_places_are_refused_before_anything_is_read_or_written(tmp_path, monkeypatch, fails, needs):
+    monkeypatch.chdir(tmp_path)
+    said = fails("count", "no-such-run", *needs, "table.csv", "--out", "c.csv", "--crossings", "x.csv")
+    assert "no-such-run" not in said
+    assert list(tmp_path.iterdir()) == []

@@ -45,7 +45,7 @@ def test_a_window_is_not_and_the_reason_is_said(folder, capsys):
 
 def test_a_place_tells_boxes_and_their_tracks(folder, capsys):
     text = explained(folder, capsys, "--at", "1.0,920,230")
-    assert "3 boxes of sensors, 1 tracks" in text
+    assert "boxes of sensors: 3, tracks: 1" in text
     assert "0.12" in text
     assert "track 2, existence 0." in text
 

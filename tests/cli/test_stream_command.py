@@ -180,8 +180,15 @@ def test_smoothed_has_the_rows_of_the_smoothed_table_of_track(
     written, table = (file.read_text().splitlines() for file in (path, tracked / "smoothed.csv"))
     assert written[0] == table[0]
     assert sorted(written) == sorted(table)
+    last: dict[str, float] = {}
+    for row in written[1:]:  # of each track in order of time
+        t, track = row.split(",")[:2]
+        assert last.get(track, -1.0) < float(t)
+        last[track] = float(t)
 
 
+# It cannot hold as long as each row is written when it is final: by the default smoother a parked vehicle
+# would hold back the rows of all others until it leaves, in memory and in each checkpoint.
 @pytest.mark.xfail(strict=True, reason="rows of tracks that have ended come before earlier ones of others")
 def test_smoothed_is_in_order_of_time(joint_lines, monkeypatch, capsys, tmp_path):
     path = tmp_path / "s.csv"

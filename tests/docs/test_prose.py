@@ -73,6 +73,26 @@ def test_the_glossary_has_at_most_sixty_terms_each_once():
     assert all(line.split("|")[2].strip() for line in TERMS)
 
 
+def plain(text: str) -> str:
+    """Lower case, and one blank for what stands between words."""
+    return re.sub(r"[\s_]+", " ", text.lower())
+
+
+def test_every_term_of_the_glossary_is_used():
+    """In the pages, or in the code, where names have underlines for blanks."""
+    pages = [path for path in prose.pages() if path.name != "glossary.md"]
+    folders = ("filters", "association", "smoothers", "eval", "jeat_graph")
+    modules = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    used = " ".join(plain(path.read_text(encoding="utf-8")) for path in (*pages, *modules))
+    names = [
+        plain(one).strip()
+        for line in TERMS
+        for one in re.sub(r"\$[^$]*\$|\([^)]*\)", "", line.split("|")[1]).split(",")
+    ]
+    assert len(names) >= len(TERMS)
+    assert [one for one in names if one not in used] == []
+
+
 def test_every_reference_of_the_glossary_is_listed_and_used():
     body, _, listed = GLOSSARY.partition("## References")
     numbers = set(re.findall(r"^(\d+)\. ", listed, flags=re.MULTILINE))

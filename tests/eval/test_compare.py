@@ -111,6 +111,8 @@ def matched_model():
 def test_on_a_matched_model_all_checks_come_out_as_expected(matched_model):
     values = matched_model.values
     for name in ("filter", lag_name(0.1), "full"):
+        for part in ("position", "velocity", "acceleration"):
+            assert values["errors"][name][f"anees_{part}"] == pytest.approx(1.0, abs=0.2)
         assert values["errors"][name]["anees_position"] == pytest.approx(1.0, abs=0.12)
         assert values["errors"][name]["anees_state"] == pytest.approx(1.0, abs=0.12)
     consistency = values["consistency"]
@@ -120,9 +122,10 @@ def test_on_a_matched_model_all_checks_come_out_as_expected(matched_model):
 
 
 def test_more_delay_never_makes_a_matched_model_worse(matched_model):
-    curve = [one["velocity_rmse"] for one in matched_model.values["lag_curve"]]
-    assert curve[0] > curve[1] > curve[2]
-    assert matched_model.values["errors"]["full"]["velocity_rmse"] == pytest.approx(curve[2], rel=0.05)
+    for part in ("position", "velocity", "acceleration"):
+        curve = [one[f"{part}_rmse"] for one in matched_model.values["lag_curve"]]
+        assert curve[0] > curve[1] > curve[2]
+        assert matched_model.values["errors"]["full"][f"{part}_rmse"] == pytest.approx(curve[2], rel=0.05)
 
 
 def test_instants_are_grouped_by_the_sensors_that_saw_the_track_and_by_distance(matched_model):

@@ -131,3 +131,50 @@ def test_errors_of_centre_and_size_are_those_of_two_sides():
     )
     assert position[0, 0] == pytest.approx(((left + right) / 2.0).var(), rel=0.02)
     assert extent[0, 0] == pytest.approx(np.log((100.0 + right - left) / 100.0).var(), rel=0.02)
+
+
+@pytest.mark.parametrize("depth", [8.0, 60.0])
+def test_told_acceleration_is_the_second_derivative_of_the_image(depth):
+    """A point X at Ẋ, at depth Z with Ż, has the image x = X/Z: ẍ = −2 Ẋ Ż/Z² + 2 X Ż²/Z³."""
+    X, X_dot, Z_dot = np.array([300.0, 900.0]), np.array([40.0, -15.0]), -25.0
+    undamped = replace(C, velocity_time_s=1e12)
+    mean = np.zeros((1, 2, singer.STATES))
+    mean[0, :, singer.POSITION] = X / depth
+    mean[0, :, singer.VELOCITY] = X_dot / depth - X * Z_dot / depth**2
+    mean[0, :, singer.GROWTH] = -Z_dot / depth
+    told = singer.told_motion(mean, undamped)[0, :, singer.ACCELERATION]
+    want = -2.0 * X_dot * Z_dot / depth**2 + 2.0 * X * Z_dot**2 / depth**3
+    np.testing.assert_allclose(told, want, rtol=1e-9)
+
+
+def test_told_acceleration_is_the_rate_of_the_predicted_velocity():
+    mean = np.random.default_rng(3).normal(size=(5, 2, singer.STATES)) * 10.0
+    mean[..., singer.GROWTH] *= 0.1
+    dt = 1e-5
+    F = singer.in_perspective(singer.discretise(dt, C).F, mean, dt, C)
+    after = (F @ mean[..., None])[..., 0]
+    rate = (after - mean)[..., singer.VELOCITY] / dt
+    np.testing.assert_allclose(singer.told_motion(mean, C)[..., singer.ACCELERATION], rate, rtol=1e-3)
+
+
+def test_told_covariance_is_that_of_the_joint_state():
+    """J P Jᵀ of both axes at once, with derivatives by differences; the axes are independent."""
+    rng = np.random.default_rng(4)
+    mean, root = rng.normal(size=(2, singer.STATES)), rng.normal(size=(2, singer.STATES, singer.STATES))
+    P = root @ root.transpose(0, 2, 1)
+    joint = np.zeros((2 * singer.STATES, 2 * singer.STATES))
+    for axis in range(2):
+        rows = slice(axis * singer.STATES, (axis + 1) * singer.STATES)
+        joint[rows, rows] = P[axis]
+
+    def of_object(flat):  # without what lasts of the errors, which the variances are not of
+        state = flat.reshape(2, singer.STATES).copy()
+        state[:, singer.MOTION :] = 0.0
+        return singer.told_motion(state, C)
+
+    h = 1e-6
+    steps = np.eye(2 * singer.STATES) * h
+    J = np.stack([(of_object(mean.ravel() + s) - of_object(mean.ravel() - s)) / (2.0 * h) for s in steps], -1)
+    got = singer.told_covariance(mean, P, C)
+    for axis in range(2):
+        np.testing.assert_allclose(got[axis], J[axis] @ joint @ J[axis].T, rtol=1e-6, atol=1e-6)

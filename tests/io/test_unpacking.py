@@ -130,8 +130,33 @@ def test_a_jpeg_says_its_size_too(tmp_path):
         read_picture(path)
 
 
+@pytest.mark.parametrize("height", [65_000, -65_000])
+def test_a_bmp_says_its_size_too(tmp_path, height):
+    path = tmp_path / "0.bmp"
+    cv2.imwrite(str(path), np.zeros((40, 60, 3), np.uint8))
+    assert read_picture(path).shape == (40, 60, 3)
+    data = bytearray(path.read_bytes())
+    data[18:26] = struct.pack("<2i", 64_000, height)
+    path.write_bytes(data)
+    with pytest.raises(DataError, match="claims 64000 x 65000 px"):
+        read_picture(path)
+    data[14:18], data[18:22] = struct.pack("<I", 12), struct.pack("<2H", 64_000, 65_000)
+    path.write_bytes(data)
+    with pytest.raises(DataError, match="claims 64000 x 65000 px"):
+        read_picture(path)
+
+
 @pytest.mark.parametrize(
-    "content", [b"", b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\xff\xd8" + b"\xff" * 50, b"no"]
+    "content",
+    [
+        b"",
+        b"BM",
+        b"BM" + b"\0" * 30,
+        b"\x89PNG\r\n\x1a\n",
+        b"\xff\xd8\xff",
+        b"\xff\xd8" + b"\xff" * 50,
+        b"no",
+    ],
 )
 def test_what_is_no_picture_is_refused(tmp_path, content):
     path = tmp_path / "0.jpg"

@@ -257,5 +257,8 @@ def test_after_a_restart_three_scans_that_never_came_say_that_the_input_is_anoth
     before.note([scan(0.05 * k, 100.0 + k) for k in range(21)])
     again = Repetition(TimeBase(5.0), whole=False)
     again.set_state(before.state(), 1.0)
-    new = [again.sort([scan(0.3 + 0.05 * k, 900.0)], lambda _: True)[1] for k in range(4)]
-    assert list(map(len, new)) == [0, 0, 1, 1]
+    known = scan(0.05, 101.0)
+    assert again.sort([known], [known], lambda _: True) == ([known], [], [])
+    strange = [[scan(0.3 + 0.05 * k, 900.0)] for k in range(4)]
+    sorted_ = [again.sort(scans, scans, lambda _: True) for scans in strange]
+    assert [[len(one) for one in lists] for lists in sorted_] == [[0, 1, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1]]

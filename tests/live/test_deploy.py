@@ -27,7 +27,25 @@ def test_the_unit_says_what_the_command_does():
     unit = UNIT.read_text()
     assert "Type=notify" in unit
     assert re.search(r"^WatchdogSec=\d+$", unit, re.M)
-    assert "ExecStart=/opt/jeat-graph/bin/jeat-graph serve /etc/jeat-graph/%i.yaml" in unit
+    assert (
+        "ExecStart=/opt/jeat-graph/bin/jeat-graph serve --set-aside-damaged /etc/jeat-graph/%i.yaml" in unit
+    )
+
+
+def test_logrotate_takes_its_file(tmp_path):
+    if shutil.which("logrotate") is None:
+        pytest.skip("logrotate is not installed")
+    rows, rules = tmp_path / "smoothed.csv", tmp_path / "rules"
+    rows.write_text("t\n1\n")
+    text = (ROOT / "deploy" / "logrotate").read_text().replace("/var/lib/jeat-graph", str(tmp_path))
+    rules.write_text(re.sub(r"^ *su .*\n", "", text, flags=re.M))
+    rules.chmod(0o644)
+    command = ["logrotate", "--force", "--state", str(tmp_path / "state"), str(rules)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    [moved] = tmp_path.glob("smoothed.csv-*")
+    assert moved.read_text() == "t\n1\n"
+    assert not rows.exists()
 
 
 def test_the_image_installs_extras_that_there_are():

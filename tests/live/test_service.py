@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -11,9 +12,11 @@ import time
 import urllib.error
 import urllib.request
 
+import numpy as np
 import pytest
 from live_tests import brokers, certificates, video
 
+from jeat_graph.io.streams.track_lines import csv_header
 from jeat_graph.live.transport.ends import open_sink, open_source
 
 PATIENCE_S = 60.0
@@ -32,9 +35,9 @@ def wait_for(true, what, service=None, patience_s=PATIENCE_S):
 class Running:
     """A service in a process of its own."""
 
-    def __init__(self, path, port):
+    def __init__(self, path, port, *options):
         self.port = port
-        command = [sys.executable, "-m", "jeat_graph", "serve", str(path)]
+        command = [sys.executable, "-m", "jeat_graph", "serve", *options, str(path)]
         self.process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         self.lines: list[dict] = []
         self._reading = threading.Thread(target=self._read, daemon=True)
@@ -315,19 +318,116 @@ def test_a_broker_that_is_not_there_yet_is_waited_for(tmp_path):
         service.process.kill()
 
 
-def test_an_old_checkpoint_is_refused_or_set_aside(tmp_path, capsys):
+UNREACHED = "sources: [{url: 'nats://127.0.0.1:1/scans'}]\nsinks: [{url: '-'}]\n"
+
+
+def saved(folder):
+    """A checkpoint of a tracker that has taken a scan, in the folder; its path."""
+    from jeat_graph import Scan, Tracker, load_config
+    from jeat_graph.live.late import LiveTracker
+
+    config = load_config("default", ["smoother.engine=none"])
+    live = LiveTracker(Tracker(config))
+    live.step(Scan(0.0, "rgb", np.array([[100.0, 100.0, 40.0, 30.0]]), np.array([0.9])))
+    live.save(folder / "state.npz")
+    return folder / "state.npz"
+
+
+def damaged(path):
+    """The file with one bit of its last array changed; its bytes."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    return bytes(content)
+
+
+def test_a_damaged_checkpoint_is_refused_unless_it_is_to_be_set_aside(tmp_path, capsys):
     from jeat_graph.cli.main import main
 
-    state = tmp_path / "state.npz"
-    state.write_bytes(b"of another version")
+    content = damaged(saved(tmp_path))
     path = tmp_path / "service.yaml"
-    text = (
-        "sources: [{url: 'nats://127.0.0.1:1/scans'}]\nsinks: [{url: '-'}]\nweb: {port: 0}\n"
-        "state: {checkpoint: state.npz, of_another_version: refuse}\n"
+    # What is said of other versions says nothing of damage.
+    path.write_text(
+        UNREACHED + "web: {port: 0}\nstate: {checkpoint: state.npz, of_another_version: set-aside}\n"
     )
-    path.write_text(text)
     assert main(["serve", str(path)]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert re.search(r"state\.npz: is .*; or let --set-aside-damaged rename it and begin anew$", said)
+    assert (tmp_path / "state.npz").read_bytes() == content
+    assert [file.name for file in tmp_path.glob("state*")] == ["state.npz"]
+
+
+def test_a_damaged_checkpoint_is_set_aside_and_told_of(tmp_path):
+    pytest.importorskip("prometheus_client", reason="the extra `serve` is not installed")
+    pytest.importorskip("nats", reason="the client is not installed")
+    content, web = damaged(saved(tmp_path)), brokers.free_port()
+    (tmp_path / "state.npz.damaged-1").write_text("an earlier one")
+    path = tmp_path / "service.yaml"
+    path.write_text(f"{UNREACHED}web: {{port: {web}}}\nstate: {{checkpoint: state.npz}}\n")
+    service = Running(path, web, "--set-aside-damaged")
+    try:
+        wait_for(lambda: service.health().get("set_aside"), "/health tells of it", service)
+        [why] = service.health()["set_aside"]
+        assert service.metric("jeat_graph_checkpoints_set_aside") == {"": 1.0}
+        assert service.end() == 0
+    finally:
+        service.process.kill()
+    aside = tmp_path / "state.npz.damaged-2"
+    assert why.endswith(f"; it is {aside} now, and the tracker begins anew: tracks get new identities")
+    [line] = [line for line in service.lines if "damaged-2" in line["text"]]
+    assert (line["level"], line["text"]) == ("warning", why)
+    assert aside.read_bytes() == content
+    assert (tmp_path / "state.npz.damaged-1").read_text() == "an earlier one"
+    assert not (tmp_path / "state.npz").exists()
+
+
+def test_a_checkpoint_of_another_version_is_refused_or_set_aside(tmp_path, monkeypatch, capsys):
+    from jeat_graph.cli.main import main
+    from jeat_graph.live.service import run
+    from jeat_graph.tracking import checkpoint
+
+    with monkeypatch.context() as patch:
+        patch.setattr(checkpoint, "FORMAT", 1)
+        content = saved(tmp_path).read_bytes()
+    path = tmp_path / "service.yaml"
+    text = UNREACHED + "web: {port: 0}\nstate: {checkpoint: state.npz, of_another_version: %s}\n"
+    path.write_text(text % "refuse")
+    assert main(["serve", "--set-aside-damaged", str(path)]) == 2  # it is not damaged
     said = capsys.readouterr().err
-    assert "state.npz: is no saved tracker" in said
+    assert "(format 1)" in said
     assert "state.of_another_version: set-aside" in said
-    assert state.read_bytes() == b"of another version"
+    assert (tmp_path / "state.npz").read_bytes() == content
+
+    monkeypatch.setattr(run.Service, "_stopped", lambda self: True)  # it ends before it waits for a broker
+    path.write_text(text % "set-aside")
+    assert main(["serve", str(path)]) == 0
+    assert (tmp_path / "state.npz.other-version-1").read_bytes() == content
+    assert not (tmp_path / "state.npz").exists()
+
+
+def test_smoothed_rows_of_a_run_that_is_not_gone_on_from_are_set_aside(tmp_path, capsys):
+    from jeat_graph.live.service.config import read_service
+    from jeat_graph.live.service.log import Log
+    from jeat_graph.live.service.run import Service
+
+    path, rows = tmp_path / "service.yaml", tmp_path / "smoothed.csv"
+    path.write_text(UNREACHED)
+    service = Service(read_service(path)[0], Log("x"))
+    rows.write_text(csv_header(False))
+    with service._smoothed_file(str(rows), None):
+        pass  # without rows it is no loss
+    content = csv_header(False) + "0.0,1\n"
+    for keep_bytes in (None, 10_000):  # no checkpoint; one of a longer file
+        rows.write_text(content)
+        with service._smoothed_file(str(rows), keep_bytes):
+            pass
+        assert rows.read_text() == csv_header(False)
+    assert [(tmp_path / f"smoothed.csv.earlier-{k}").read_text() for k in (1, 2)] == [content] * 2
+    first, second = (json.loads(line)["text"] for line in capsys.readouterr().err.splitlines())
+    assert f"{rows}: is of a run that is not gone on from; it is {rows}.earlier-1 now" in first
+    assert f"and had 10000 when the checkpoint was written; it is {rows}.earlier-2 now" in second
+    rows.write_text(content)
+    with service._smoothed_file(str(rows), 0):
+        pass  # the checkpoint is from before the first row, and all come again
+    assert rows.read_text() == csv_header(False)
+    assert not (tmp_path / "smoothed.csv.earlier-3").exists()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import json
+import logging
 import os
 import socket
+import warnings
 
 import numpy as np
 import pytest
@@ -13,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.cli.main import main
-from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.errors import ConfigError, InputWarning
+from jeat_graph.data.notes import note
 from jeat_graph.data.scan import Scan
 from jeat_graph.live.service.config import read_service
 from jeat_graph.live.service.log import Log
@@ -139,6 +142,20 @@ def test_the_log_is_json_a_line_and_strikes_logins_out():
     assert first["text"] == "rtsp://***@cam/x: gone\nfor long"
     assert second["messages"] == 3
     assert second["time"].endswith("Z")
+
+
+def test_warnings_and_notes_are_lines_of_the_log(capsys):
+    stream = io.StringIO()
+    with Log("gantry7", stream).of_libraries():
+        warnings.warn("boxes lie outside", InputWarning, stacklevel=1)
+        note("the first frame is 1")
+    logging.getLogger("broker").error("is gone")
+    lines = [json.loads(line) for line in stream.getvalue().splitlines()]
+    assert [(line["level"], line["text"]) for line in lines] == [
+        ("warning", "boxes lie outside"),
+        ("info", "the first frame is 1"),
+    ]
+    assert "boxes" not in capsys.readouterr().err
 
 
 class TestSystemd:

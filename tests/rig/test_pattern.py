@@ -15,6 +15,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.io.events.dsec_writer import EventWriter
+from jeat_graph.io.media.decoders import PICTURES
 from jeat_graph.io.tables.detections_io import write_detections
 from jeat_graph.rig.pattern import Pattern, find_corners, map_of_places, picture_of_counts, same_place
 
@@ -67,14 +68,19 @@ def seen(drawn: np.ndarray, H: np.ndarray, size: tuple[int, int], noise: float =
     return np.clip(cv2.GaussianBlur(picture, (0, 0), 0.7), 0, 255).astype(np.uint8)
 
 
-def write_views(folder: Path, kind: str, places: tuple[tuple[int, int, int, int], ...] = PLACES) -> list[str]:
+def write_views(
+    folder: Path,
+    kind: str,
+    places: tuple[tuple[int, int, int, int], ...] = PLACES,
+    suffix: str = ".png",
+) -> list[str]:
     """Folders of pictures of both cameras, as arguments of the command."""
     drawn = board(kind)
     for name, way, size in (("rgb", np.eye(3), COMMON), ("evt", np.linalg.inv(TRUE), OWN)):
         (folder / name).mkdir()
         for k, place in enumerate(places):
             picture = seen(drawn, way @ onto_picture(place, drawn), size)
-            cv2.imwrite(str(folder / name / f"{k}.png"), picture)
+            cv2.imwrite(str(folder / name / f"{k}{suffix}"), picture)
     return ["--view", f"rgb={folder / 'rgb'}", "--view", f"evt={folder / 'evt'}"]
 
 
@@ -105,6 +111,21 @@ def test_the_true_homography_is_found_from_pictures(tmp_path: Path, kind: str, s
     assert error_px(way) < 0.5
     assert way.std_px(OWN) < 0.5
     assert load_config(rig=out).sensors["evt"].image == OWN
+
+
+@pytest.mark.parametrize("suffix", PICTURES)
+def test_a_picture_may_have_any_suffix_that_folders_of_frames_may_have(tmp_path: Path, suffix: str) -> None:
+    folders = write_views(tmp_path, "checkerboard", suffix=suffix)
+    out, files = tmp_path / "rig.yaml", []
+    for name in ("rgb", "evt"):
+        for file in sorted((tmp_path / name).iterdir()):
+            files += ["--view", f"{name}={file}"]
+    found = []
+    for views in (folders, files):
+        assert main(["register", "--pattern", "checkerboard:7x5", *views, "--out", str(out)]) == 0
+        assert error_px(way_of(out)) < 1.0
+        found.append(load_config(rig=out).sensors["evt"].to_picture)
+    assert found[0] == found[1]
 
 
 def test_the_reference_turns_the_map_round(tmp_path: Path) -> None:

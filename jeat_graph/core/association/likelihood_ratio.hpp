@@ -20,14 +20,11 @@ inline constexpr double kLeastGain = 1e-9;
 
 // What holds for all pairs of one scan.
 struct ScanTerms {
-    double student_constant, normal_constant, log_body, log_tail, log_clutter;
+    double student_constant, log_clutter;
 
     ScanTerms(double leftovers, double picture_area, const ModelConstants& c) {
         const double nu = c.degrees_of_freedom;
         student_constant = log_gamma((nu + 4.0) / 2.0) - log_gamma(nu / 2.0) - 2.0 * log_of(nu * kPi);
-        normal_constant = -2.0 * filters::kLog2Pi;
-        log_body = log1p_of(-c.outlier_share);
-        log_tail = log_of(c.outlier_share);
         log_clutter = log_of((leftovers + c.clutter_prior) / (picture_area * c.clutter_size_area));
     }
 };
@@ -63,20 +60,17 @@ inline double cut_log_density(const std::array<double, 4>& y, const SidesExpecte
 // ln p(y) of a pair, or kImpossible where it lies outside every gate.
 inline double sides_log_density(const std::array<double, 4>& y, const SidesExpected& expected, const ScanTerms& terms,
                                 const ModelConstants& c) {
-    const double d2 = filters::squared_distance(y, expected.S), wide = filters::squared_distance(y, expected.wide);
-    const double cut = cut_log_density(y, expected, c);
-    double out = cut;
-    if (std::min(d2, c.outlier_gate * wide) > c.gate) return out;
+    const double d2 = filters::squared_distance(y, expected.S), cut = cut_log_density(y, expected, c);
+    if (d2 > c.gate) return cut;
     const double nu = c.degrees_of_freedom;
     const double body = terms.student_constant - 0.5 * expected.log_det - (nu + 4.0) / 2.0 * log1p_of(d2 / nu);
-    const double tail = terms.normal_constant - 0.5 * expected.log_det_wide - 0.5 * wide;
-    return log_add(out, log_add(terms.log_body + body, terms.log_tail + tail));
+    return log_add(cut, body);
 }
 
 // How far a box's left side (axis 0), or its top, may lie from the expected one at most.
 inline double reach(const SidesExpected& expected, int axis, const ModelConstants& c) {
-    const double whole = std::max(expected.S[axis].ll, expected.wide[axis].ll / c.outlier_gate);
-    return std::max(std::max(1.0, c.most_uncovered) * expected.size[axis], std::sqrt(std::max(c.gate, c.cut_gate) * whole));
+    const double whole = std::sqrt(std::max(c.gate, c.cut_gate) * expected.S[axis].ll);
+    return std::max(std::max(1.0, c.most_uncovered) * expected.size[axis], whole);
 }
 
 }  // namespace jeat::association

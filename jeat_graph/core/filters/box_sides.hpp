@@ -29,8 +29,8 @@ struct Pair2 {
 struct SidesExpected {
     Sides box;
     std::array<double, 2> size, variance;  // of one measured side, by axis
-    std::array<Pair2, 2> S, wide;          // covariance of the innovation, and with an outlier's variance
-    double log_det, log_det_wide;          // over both axes
+    std::array<Pair2, 2> S;                // covariance of the innovation
+    double log_det;                        // over both axes
 };
 
 // rho^2 of the sensor, its variance in sizes^2.
@@ -43,9 +43,8 @@ inline SidesExpected expected_sides(const double* mean, const double* covariance
     SidesExpected out;
     out.box = expected_corners(mean);
     out.size = {out.box.width(), out.box.height()};
-    const double area = out.size[0] * out.size[1], both = std::sqrt(area);
-    const double extra = square(c.outlier_std) * area;
-    out.log_det = out.log_det_wide = 0.0;
+    const double both = std::sqrt(out.size[0] * out.size[1]);
+    out.log_det = 0.0;
     for (int axis = 0; axis < 2; ++axis) {
         const double* const P = covariance + axis * kMatrix;
         const auto sum = [P](int i, int j, int k, int l) { return P[i * kStates + k] + P[i * kStates + l] + P[j * kStates + k] + P[j * kStates + l]; };
@@ -55,9 +54,7 @@ inline SidesExpected expected_sides(const double* mean, const double* covariance
         const double R = side_variance(w, both, rho2, c);
         out.variance[axis] = R;
         out.S[axis] = {a - b + d + R, a - d, a + b + d + R};
-        out.wide[axis] = out.S[axis].plus(extra, extra);
         out.log_det += log_of(out.S[axis].determinant());
-        out.log_det_wide += log_of(out.wide[axis].determinant());
     }
     return out;
 }
@@ -87,14 +84,12 @@ inline Edges unmeasured(const std::array<double, 4>& y, const Edges& edges) {
 
 // What is expected of a box whose sides are cut by the edge: they lie anywhere within about the object.
 inline SidesExpected with_cut(SidesExpected expected, const Edges& cut, const ModelConstants& c) {
-    expected.log_det = expected.log_det_wide = 0.0;
+    expected.log_det = 0.0;
     for (int axis = 0; axis < 2; ++axis) {
         const double V = square(c.edge_std * expected.size[axis]);
         const double left = cut.at[2 * axis] ? V : 0.0, right = cut.at[2 * axis + 1] ? V : 0.0;
         expected.S[axis] = expected.S[axis].plus(left, right);
-        expected.wide[axis] = expected.wide[axis].plus(left, right);
         expected.log_det += log_of(expected.S[axis].determinant());
-        expected.log_det_wide += log_of(expected.wide[axis].determinant());
     }
     return expected;
 }

@@ -38,8 +38,6 @@ struct Bounds {
     JEAT_ONE(cut_gate) \
     JEAT_ONE(uncovered_share) \
     JEAT_ONE(most_uncovered) \
-    JEAT_ONE(outlier_share) \
-    JEAT_ONE(outlier_std) \
     JEAT_ONE(edge_px) \
     JEAT_ONE(edge_std) \
     JEAT_ONE(edge_birth) \
@@ -47,7 +45,6 @@ struct Bounds {
     JEAT_ONE(offset_clip) \
     JEAT_ONE(offset_age_s) \
     JEAT_ONE(gate) \
-    JEAT_ONE(outlier_gate) \
     JEAT_ONE(clutter_size_area) \
     JEAT_ONE(clutter_memory) \
     JEAT_ONE(clutter_prior) \

@@ -41,7 +41,7 @@ struct Rows {
         track_id.clear(), used.clear(), label.clear();
     }
     void add(double at, const Called& called, const double* state, const double* covariance, double probability,
-             std::int64_t sensors) {
+             std::int64_t sensors, const ModelConstants& c) {
         t.push_back(at);
         track_id.push_back(called.track_id);
         label.push_back(called.label);
@@ -49,15 +49,10 @@ struct Rows {
         real.push_back(probability);
         used.push_back(sensors);
         // Told is the box as detectors have it, and how far that may be from the object.
-        for (int axis = 0; axis < 2; ++axis) {
-            const double* const own = state + axis * kStates;
-            mean.insert(mean.end(), own, own + filters::kMotion);
-            double* const told = mean.data() + mean.size() - filters::kMotion;
-            told[filters::kPosition] += own[filters::kPositionError];
-            told[filters::kLogSize] += own[filters::kSizeError];
-        }
-        for (int axis = 0; axis < 2; ++axis)
-            for (int k = 0; k < filters::kMotion; ++k) variance.push_back(covariance[axis * kMatrix + k * kStates + k]);
+        const std::size_t first = mean.size();
+        mean.resize(first + 2 * filters::kMotion);
+        variance.resize(first + 2 * filters::kMotion);
+        filters::tell_motion(state, covariance, c, mean.data() + first, variance.data() + first);
     }
 };
 
@@ -253,7 +248,7 @@ private:
             if (given + 1 < n && entries[given + 1].t == e.t) continue;  // a later step of the same time tells more
             if (e.due) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
             if (real > c.report)
-                out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used);
+                out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used, c);
         }
         if (!forget) return;
         history.last_seen = last_seen;

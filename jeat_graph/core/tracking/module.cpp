@@ -250,7 +250,8 @@ private:
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             if (!reported_[i]) continue;
             const double* const covariance = tracks.covariance_of(i);
-            answer.rows.add(t, {tracks.track_id[i]}, tracks.mean_of(i), covariance, tracks.real[i], tracks.used[i]);
+            answer.rows.add(t, {tracks.track_id[i]}, tracks.mean_of(i), covariance, tracks.real[i], tracks.used[i],
+                            now_.state.constants);
             answer.mean.insert(answer.mean.end(), tracks.mean_of(i), tracks.mean_of(i) + kMean);
             answer.covariance.insert(answer.covariance.end(), covariance, covariance + kCovariance);
         }

@@ -15,6 +15,7 @@ from jeat_graph.data.trajectories import Trajectories
 NUMBER, CLASS, SPEED = "id", "class", "speed"
 PARTS = (CLASS, NUMBER, SPEED)
 _TOLERANCE_S = 1e-6
+_ByTrack = Mapping[int, tuple[FloatArray, FloatArray | TextArray]]
 #: A speed is of so much before or after (s).
 _REACH_S = 0.5
 
@@ -35,20 +36,22 @@ class Captions:
         speeds: tuple[FloatArray, IntArray, FloatArray] | None = None,
     ) -> None:
         self._parts = parts
-        named = None if table.classes is None else table.classes
-        self._classes = {} if named is None else _by_track(table.t, table.track_id, named)
-        self._speeds = {} if speeds is None else _by_track(*speeds)
+        self._classes: _ByTrack = {}
+        if table.classes is not None:
+            said = table.classes != ""
+            self._classes = _by_track(table.t[said], table.track_id[said], table.classes[said])
+        self._speeds: _ByTrack = {} if speeds is None else _by_track(*speeds)
 
     def of(self, track_id: int, t: float) -> str:
         """Return the caption of a track at a time (s): its class is the one that it was last said to have."""
         texts = []
         if CLASS in self._parts and track_id in self._classes:
             times, names = self._classes[track_id]
-            at = max(int(np.searchsorted(times, t + _TOLERANCE_S, side="right")) - 1, 0)
-            texts.append(str(names[at]))
+            said = int(np.searchsorted(times, t + _TOLERANCE_S, side="right"))
+            texts += [str(name) for name in names[:said][-1:]]
         if NUMBER in self._parts:
-            texts.append(f"#{track_id}" if any(texts) else str(track_id))
-        caption = " ".join(text for text in texts if text)
+            texts.append(f"#{track_id}" if texts else str(track_id))
+        caption = " ".join(texts)
         if SPEED in self._parts and track_id in self._speeds:
             speed = _near(*self._speeds[track_id], t)
             if not math.isnan(speed):
@@ -69,9 +72,7 @@ def read_speeds(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:
     return table.number("t"), table.whole("track_id"), speed
 
 
-def _by_track(
-    t: FloatArray, track_id: IntArray, values: FloatArray | TextArray
-) -> Mapping[int, tuple[FloatArray, FloatArray | TextArray]]:
+def _by_track(t: FloatArray, track_id: IntArray, values: FloatArray | TextArray) -> _ByTrack:
     """Return times and values of each track, in order of time."""
     order = np.lexsort((t, track_id))
     ids = track_id[order]

@@ -22,6 +22,7 @@ from jeat_graph.io.media.pictures import as_png, check_frames, finish_video, ope
 from jeat_graph.io.media.video import RgbImage, quietly
 
 CODECS = {".mp4": "vp09", ".webm": "VP80"}
+_CALLED = {"vp09": "VP9", "VP80": "VP8"}
 #: What a film in MP4 may be asked to be: H.264 where there is an encoder, H.264, or VP9.
 AUTO, H264, VP9 = "auto", "h264", "vp9"
 KINDS = (AUTO, H264, VP9)
@@ -36,12 +37,16 @@ class MovieWriter(PiecewiseWriter):
         rate_hz: frames per second.
         kind: of films in MP4, one of `KINDS`.
 
+    Attributes:
+        codec: what the film is written as, in words; known from entering on.
+
     Raises:
         DataError: on entering, if no film of this kind can be written here; on leaving, if it is not whole.
     """
 
     def __init__(self, path: str | Path, size_px: tuple[int, int], rate_hz: float, kind: str = VP9) -> None:
         super().__init__()
+        self.codec = ""
         self._kind = kind
         self._path, self._size_px, self._rate_hz = Path(path), size_px, rate_hz
         self._sink: Any = None
@@ -61,7 +66,11 @@ class MovieWriter(PiecewiseWriter):
         if encoder is not None:
             size, rate = self._size_px, self._rate_hz
             self._ffmpeg = FfmpegVideo(self._stack, self._temporary, self._path, rate, size, encoder)
+            self.codec = f"H.264, by {encoder[1]} of FFmpeg"
             return
+        self.codec = _CALLED[codec]
+        if self._kind == AUTO and self._path.suffix.lower() == ".mp4":
+            self.codec += ", as no FFmpeg with an encoder of H.264 was found"
         self._sink = open_video(self._stack, self._temporary, self._path, codec, self._rate_hz, self._size_px)
 
     def _finish(self) -> None:

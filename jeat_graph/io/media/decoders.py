@@ -19,7 +19,8 @@ from jeat_graph.io.media.picture_file import read_picture
 RgbImage = npt.NDArray[np.uint8]
 
 _MS_PER_S = 1e3
-_PICTURES = (".png", ".jpg", ".jpeg")
+#: What files of pictures are called.
+PICTURES = (".png", ".jpg", ".jpeg", ".bmp")
 #: Videos whose header says how many frames there are; Matroska has only an estimate from its length.
 _COUNTED = (".mp4", ".mov", ".m4v", ".avi")
 
@@ -69,10 +70,10 @@ class PictureDecoder(Decoder):
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._files = sorted(
-            (p for p in folder.iterdir() if p.suffix.lower() in _PICTURES), key=lambda p: _natural(p.name)
+            (p for p in folder.iterdir() if p.suffix.lower() in PICTURES), key=lambda p: _natural(p.name)
         )
         if not self._files:
-            raise DataError(f"no pictures ({', '.join(_PICTURES)}) in this folder", folder)
+            raise DataError(f"no pictures ({', '.join(PICTURES)}) in this folder", folder)
         for file in self._files:
             if not file.is_file():
                 check_file(file)  # says what it is: a folder, a pipe, a link to nothing

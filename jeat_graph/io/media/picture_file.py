@@ -15,6 +15,9 @@ from jeat_graph.io.files.limits import check_file
 MOST_PIXELS = 1 << 27
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_SIZE = struct.Struct(">16x2I")
+_BMP = b"BM"
+_BMP_SIZE = struct.Struct("<18x2i")  # a height below 0: from the top down
+_BMP_SHORT, _BMP_SHORT_SIZE = b"\x0c\0\0\0", struct.Struct("<18x2H")  # the head of OS/2
 _JPEG = b"\xff\xd8"
 _JPEG_SIZE = struct.Struct(">2H")
 _JPEG_SIZE_AT = 5  # in a frame's head, from its marker on
@@ -48,10 +51,14 @@ def read_picture(path: str | Path) -> npt.NDArray[np.uint8]:
 
 
 def _size(content: bytes) -> tuple[int, int]:
-    """Return width and height (px) of a PNG or JPEG; 0, 0 where its head does not say."""
+    """Return width and height (px) of a PNG, BMP or JPEG; 0, 0 where its head does not say."""
     if content.startswith(_PNG) and len(content) >= _PNG_SIZE.size:
         width, height = _PNG_SIZE.unpack_from(content)
         return width, height
+    if content.startswith(_BMP) and len(content) >= _BMP_SIZE.size:
+        short = content[14:18] == _BMP_SHORT
+        width, height = (_BMP_SHORT_SIZE if short else _BMP_SIZE).unpack_from(content)
+        return abs(width), abs(height)
     at = len(_JPEG)
     end = len(content) - _JPEG_SIZE_AT - _JPEG_SIZE.size
     while content.startswith(_JPEG) and at <= end and content[at] == 0xFF:

@@ -86,7 +86,9 @@ class StateConfig(Section):
     every_s: float = number(10.0, "s", "time between checkpoints", open_low=True)
     smoothed: str | None = None
     of_another_version: str = choice(
-        "refuse", ("refuse", "set-aside"), "a checkpoint that cannot be gone on from: the end, or renamed"
+        "refuse",
+        ("refuse", "set-aside"),
+        "a checkpoint of another version or of other settings: the end, or renamed",
     )
 
 

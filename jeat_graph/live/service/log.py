@@ -7,10 +7,12 @@ import logging
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
+from jeat_graph.data.notes import listening
 from jeat_graph.data.secrets import without_logins
 
 INFO, WARNING, ERROR = "info", "warning", "error"
@@ -45,11 +47,17 @@ class Log:
 
     @contextmanager
     def of_libraries(self) -> Iterator[None]:
-        """Write what libraries log, too, as lines like the others."""
+        """Write what libraries log, warnings and notes, too, as lines like the others."""
+
+        def show(message: Any, *_: Any, **__: Any) -> None:
+            self.write(WARNING, str(message))
+
         handler, root = _LibraryHandler(self), logging.getLogger()
         root.addHandler(handler)
         try:
-            yield
+            with warnings.catch_warnings(), listening(self.say):
+                warnings.showwarning = show
+                yield
         finally:
             root.removeHandler(handler)
 

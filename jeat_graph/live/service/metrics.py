@@ -63,6 +63,8 @@ class Metrics:
         if status.saved is not None:
             age: list[tuple[list[str], float]] = [([], now - status.saved)]
             yield family(gauge, "checkpoint_age_seconds", "since the newest checkpoint", age)
+        aside: list[tuple[list[str], float]] = [([], float(len(status.set_aside)))]
+        yield family(gauge, "checkpoints_set_aside", "that could not be gone on from at the start", aside)
         for name, value in health["messages"].items():
             yield family(counter, name, f"messages or checkpoints {name.replace('_', ' ')}", [([], value)])
         yield family(counter, "dropped", "pictures dropped and scans passed over", [([], status.dropped)])

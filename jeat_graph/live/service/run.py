@@ -14,6 +14,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.files.locking import hold_file
+from jeat_graph.io.files.setting_aside import set_aside
 from jeat_graph.io.streams.scan_batch import ScanBatch
 from jeat_graph.io.streams.stream_reading import StreamReading
 from jeat_graph.live.interrupts import Interrupts
@@ -27,7 +28,7 @@ from jeat_graph.live.service.status import RUNNING, STOPPING, Status
 from jeat_graph.live.service.systemd import Watchdog, notify
 from jeat_graph.live.service.web import Web
 from jeat_graph.live.session import MESSAGE_ERRORS, Ends, Session, of_message
-from jeat_graph.live.smoothed_file import SmoothedFile
+from jeat_graph.live.smoothed_file import SmoothedFile, has_rows
 from jeat_graph.live.told import BadLines
 from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.tracking.tracker import Tracker
@@ -60,10 +61,12 @@ class Service:
     Args:
         config: of the service.
         log: takes what is to be said.
+        sets_aside_damaged: whether a damaged checkpoint is renamed and the tracker begins anew; or refused.
     """
 
-    def __init__(self, config: ServiceConfig, log: Log) -> None:
+    def __init__(self, config: ServiceConfig, log: Log, *, sets_aside_damaged: bool = False) -> None:
         self._config, self._log = config, log
+        self._sets_aside_damaged = sets_aside_damaged
         self.status = Status(config.name, config.silent_s)
         self._interrupts = Interrupts()
 
@@ -140,7 +143,7 @@ class Service:
             log.write(INFO, f"goes on from {config.state.checkpoint}")
         smoothed = None
         if config.state.smoothed is not None:
-            smoothed = stack.enter_context(SmoothedFile(config.state.smoothed, more.get("smoothed")))
+            smoothed = stack.enter_context(self._smoothed_file(config.state.smoothed, more.get("smoothed")))
         session = Session(
             live,
             Ends(
@@ -198,14 +201,35 @@ class Service:
                     raise ConfigError(f"{path}: was saved with late: {live.policy}, not {late}")
                 return live, more
             except JeatGraphError as error:
-                if state.of_another_version == "refuse":
+                # Settings and versions differ because somebody changed them; damage is nobody's wish.
+                damaged = isinstance(error, DataError)
+                if damaged and not self._sets_aside_damaged:
+                    raise ConfigError(
+                        f"{error}; or let --set-aside-damaged rename it and begin anew"
+                    ) from None
+                if not damaged and state.of_another_version == "refuse":
                     raise ConfigError(
                         f"{error}; or let `state.of_another_version: set-aside` rename it and begin anew"
                     ) from None
-                aside = f"{path}.{time.strftime('%Y%m%dT%H%M%SZ', time.gmtime())}"
-                Path(path).replace(aside)
-                self._log.say(f"warning: {error}; it is {aside} now, and the tracker begins anew")
+                aside = set_aside(path, "damaged" if damaged else "other-version")
+                text = f"{error}; it is {aside} now, and the tracker begins anew: tracks get new identities"
+                self.status.set_aside.append(text)
+                self._log.say(f"warning: {text}")
         return None
+
+    def _smoothed_file(self, path: str, keep_bytes: int | None) -> SmoothedFile:
+        """The file of smoothed rows; one that is not gone on with is renamed, never overwritten."""
+        try:
+            if keep_bytes is not None or not has_rows(path):
+                return SmoothedFile(path, keep_bytes)
+            why = f"{path}: is of a run that is not gone on from"
+        except DataError as error:
+            if not has_rows(path):  # a folder, say
+                raise
+            why = str(error)
+        aside = set_aside(path, "earlier")
+        self._log.say(f"warning: {why}; it is {aside} now, and rows go into a new file")
+        return SmoothedFile(path)
 
     def _answering(self, sinks: Sinks) -> Any:
         status = self.status

@@ -97,6 +97,7 @@ class Status:
         counted: what is counted.
         lag_s: how long after its own time the newest scan was answered (s), or None.
         tracks: how many are reported now.
+        set_aside: why a checkpoint was set aside and the tracker began anew; a line for each.
         saved: when the newest checkpoint was written (s, of `time.monotonic`), or None.
         beat: when the main thread last did something (s, of `time.monotonic`).
         detectors_beat: tells the same of the detectors, of that which was silent for longest.
@@ -113,6 +114,7 @@ class Status:
     counted: Counted = field(default_factory=Counted)
     lag_s: float | None = None
     tracks: int = 0
+    set_aside: list[str] = field(default_factory=list)
     saved: float | None = None
     beat: float = field(default_factory=time.monotonic)
     detectors_beat: Callable[[], float] = time.monotonic
@@ -210,6 +212,7 @@ class Status:
             "dropped": self.dropped,
             "tracks": self.tracks,
             "messages": vars(self.counted),
+            "set_aside": list(self.set_aside),
             "checkpoint_age_s": None if self.saved is None else round(now - self.saved, 1),
             "sources": [one.shown() for one in self.sources],
             "sinks": [one.shown() for one in self.sinks],

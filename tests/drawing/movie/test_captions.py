@@ -42,11 +42,16 @@ def test_a_caption_is_class_number_and_speed():
     assert captions.of(8, 0.0) == "8"
 
 
+def test_a_class_is_the_one_that_was_last_said():
+    captions = Captions(classed(["", "car", "", "van"]), PARTS)
+    assert [captions.of(7, t) for t in (0.0, 0.1, 0.2, 0.3)] == ["7", "car #7", "car #7", "van #7"]
+
+
 def test_parts_are_chosen():
     table = classed(["car", ""])
     speeds = (np.array([0.0]), np.array([7]), np.array([np.nan]))
     assert Captions(table, (CLASS,)).of(7, 0.0) == "car"
-    assert Captions(table, (CLASS, NUMBER)).of(7, 0.1) == "7"
+    assert Captions(table, (NUMBER,)).of(7, 0.1) == "7"
     assert Captions(table, (SPEED,), speeds).of(7, 0.0) == ""
     assert Captions(vehicle([0.0], 7), PARTS).of(7, 0.0) == "7"
 
@@ -69,6 +74,48 @@ def test_a_line_counts_up_to_the_time_that_is_shown():
         "yard: in 1, out 0",
         "yard: in 1, out 1",
     ]
+
+
+@pytest.mark.parametrize("only", [[], ["--only", "causal"], ["--only", "smoothed"]])
+def test_the_labels_of_a_film_have_the_classes_of_its_run(only, tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr(Canvas, "names", lambda self, boxes, texts, *_, **__: written.extend(texts))
+    for kind in ("causal", "smoothed"):
+        write_trajectories(classed(["car", "car", "van"]), tmp_path / f"{kind}.csv")
+    assert main(["render", str(tmp_path), *only, "--at", "0.1", "--out", str(tmp_path / "a.png")]) == 0
+    assert written == ["car #7"]
+
+
+@pytest.mark.parametrize(
+    ("encoder", "words", "said"),
+    [
+        (None, [], "(VP9, as no FFmpeg with an encoder of H.264 was found)"),
+        (None, ["--codec", "vp9"], "(VP9)"),
+        (("true", "libx264"), ["--codec", "vp9"], "(VP9)"),
+        (("true", "libx264"), [], "(H.264, by libx264 of FFmpeg)"),
+    ],
+)
+def test_render_says_which_codec_it_used(encoder, words, said, run, tmp_path, monkeypatch, capsys):
+    from jeat_graph.drawing.movie import film
+
+    class Encoded:
+        """Stands for FFmpeg."""
+
+        def __init__(self, *_):
+            pass
+
+        def write(self, rgb):
+            pass
+
+        def release(self):
+            pass
+
+    monkeypatch.setattr(film, "h264_encoder", lambda: encoder)
+    monkeypatch.setattr(film, "FfmpegVideo", Encoded)
+    monkeypatch.setattr(film, "check_frames", lambda *_: None)
+    out = tmp_path / "film.mp4"
+    assert main(["render", str(run), "--output-rate", "5", *words, "--out", str(out)]) == 0
+    assert capsys.readouterr().out.endswith(f" px {said}\n")
 
 
 def test_lines_are_drawn_where_they_lie(run, tmp_path):
