@@ -80,7 +80,7 @@ class _LateParser(Parser):
 
 
 #: Options that say where a result is read or written, and not what it is.
-_PLACES = ("--out", "--readme", "--page", "--from", "--jobs", "--cache")
+_PLACES = ("--out", "--readme", "--page", "--from", "--keep", "--jobs", "--cache")
 
 
 def build_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:

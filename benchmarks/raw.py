@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import common
 from benchmarks.baselines import peers_here
+from benchmarks.kept import kept_or_found
 from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from benchmarks.raw_options import add_raw, detectors_of, findings
-from benchmarks.raw_segments import SENSORS, RawFound, RawSegment, described, find_in, segments_in
+from benchmarks.raw_segments import SENSORS, RawFound, RawSegment, described, segments_in
 from benchmarks.recordings import JudgedRecording
 from jeat_graph.config.reading import config_to_dict, load_config
 from jeat_graph.data.detections import Detections
@@ -79,6 +80,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--presets", nargs="+", default=["default"], metavar="NAME", help="of our tracker (default: default)"
     )
     parser.add_argument("--no-peers", action="store_true", help="leave ByteTrack out")
+    parser.add_argument(
+        "--keep",
+        metavar="DIR",
+        help="keep there what detectors find, and take what the same ones found in the same segments",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -96,7 +102,9 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         )
     configs = {name: load_config(name) for name in (*args.presets, PAPER)}
     with_peers = not args.no_peers and "bytetrack" in peers_here()
-    found = in_processes(find_in, findings(args, segments), args.jobs, "detecting")
+    found = in_processes(
+        kept_or_found, [(one, args.keep) for one in findings(args, segments)], args.jobs, "detecting"
+    )
     recordings = _recordings(found)
     rows = [
         row
