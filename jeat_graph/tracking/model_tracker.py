@@ -161,7 +161,8 @@ class ModelTracker(Updates, SavedModel):
                 the sensor looked and found nothing.
 
         Returns:
-            The reported tracks at that time.
+            The reported tracks at that time, no earlier rows: `Trajectories.concatenate` joins those of all
+            steps.
 
         Raises:
             DataError: boxes, scores or embeddings that are not valid, or too many sensors.
@@ -294,12 +295,17 @@ class ModelTracker(Updates, SavedModel):
             sensor_index(scan.sensor, self.sensor_names)
 
     def causal(self) -> Trajectories:
-        """Return the tracks that are reported now, as the last step did."""
+        """Return the tracks that are reported now, as the last step did: not the rows of earlier steps."""
         if self._causal is None:
             now = self.time
             at = None if now is None else np.array([now])
             self._causal = self._table(with_classes(self._model.rows(), self._classes, self._called), at)
         return self._causal
+
+    def rows_below_least(self) -> int:
+        """Return how many rows of the last step `output.min_existence` left out of the table."""
+        least = self.config.output.min_existence
+        return 0 if least <= self.constants.report else int((self._model.rows()[4] < least).sum())
 
     def predict(self, t: float) -> Prediction:
         """Say where the tracks that are reported now will be at a time; nothing changes.
