@@ -15,7 +15,7 @@ import numpy as np
 
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
-from jeat_graph.core import _core
+from jeat_graph.core import tracking as core
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
@@ -112,7 +112,7 @@ class ModelTracker(Updates, SavedModel):
         self._diagnostics = diagnostics
         self._smooths = config.smoother.engine != "none"
         # The core's has the methods of the reference.
-        make = cast(type[ReferenceModel], _core.tracking.Model) if engine == "core" else ReferenceModel
+        make = cast(type[ReferenceModel], core.Model) if engine == "core" else ReferenceModel
         known = config.input.picture == "given"
         size = (float(config.image.width), float(config.image.height)) if known else (1.0, 1.0)
         self._model = make(self.constants, *size, known, self._lag_s())
