@@ -25,7 +25,7 @@ _PUBLISHER = re.compile(r"[A-Za-z]{2}:\S.*")
 Columns = dict[str, npt.NDArray[Any]]
 _CROSSINGS = "crossings.csv"
 #: Columns of times (s) and of the same times on the clock.
-_CLOCKS = {"t": "time", "t_from": "begin", "t_to": "end"}
+_CLOCKS = {"t": "time", "t_from": "begin", "t_to": "end", "t_start": "begin", "t_end": "end"}
 
 
 def clock_s(begin: str | None) -> float:

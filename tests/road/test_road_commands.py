@@ -208,7 +208,9 @@ def test_results_of_other_trackers_are_taken_in_every_format(tmp_path: Path, cap
         assert main([*command, "--rate", "20", "--interval", "1", "--contact", "bottom"]) == 0
         tables.append([row["speed_kmh"] for row in _rows(tmp_path / "out" / "speeds.csv")])
         counts = _rows(tmp_path / "out" / "counts.csv")
-        starts = [row["t_start"] for row in counts if row["lane"] == row["class"] == "all"]
+        starts = [
+            row["t_start"] for row in counts if row["direction"] == row["lane"] == row["class"] == "all"
+        ]
         assert list(map(float, starts)) == [0.0, 1.0, 2.0]
     assert len(tables[0]) == 1
     assert tables[0] == tables[1]
