@@ -31,7 +31,10 @@ KINDS = {
     "dsec-mot": (_TABLES, "trackers on DSEC-MOT: events of a driving car"),
     "tumtraf": (_TABLES, "trackers on TUMTraf: cameras over a road, boxes in OpenLABEL"),
     "real": (_TABLES, "trackers on all recordings of a folder"),
-    "simulated": (_TABLES, "trackers on simulated highways, streets, squares, and with odd detectors"),
+    "simulated": (
+        "benchmarks.simulated",
+        "trackers on simulated highways, streets, squares, and with odd detectors",
+    ),
     "ablation": ("benchmarks.ablation", "what each term of the model gains, over all sets"),
     "constants": (
         "benchmarks.constants",
@@ -39,7 +42,8 @@ KINDS = {
     ),
     "detection": ("benchmarks.detection", "how well detectors find vehicles in raw pictures and raw events"),
     "raw": ("benchmarks.raw", "from raw pictures and raw events to tracks"),
-    "road": ("benchmarks.road", "place and speed on the road, simulated and against laser gates"),
+    "road": ("benchmarks.road", "place and speed on simulated roads"),
+    "road-real": ("benchmarks.road_real", "speeds on real highways against laser gates"),
     "speed": ("benchmarks.speed", "time per step, against others"),
     "endurance": (
         "benchmarks.endurance",
@@ -54,9 +58,10 @@ KINDS = {
         "pictures and clocks of two cameras brought together by the traffic they saw",
     ),
     "stale": ("benchmarks.stale", "which tables were made by code that has changed since"),
-    "events": (
-        "benchmarks.events",
-        "decoding beside other packages, noise of the event cameras, and what vehicles give",
+    "events": ("benchmarks.events", "decoding and representations of events beside other packages"),
+    "event-cameras": (
+        "benchmarks.event_cameras",
+        "noise of simulated event cameras, and the events of vehicles",
     ),
 }
 
@@ -75,7 +80,7 @@ class _LateParser(Parser):
 
 
 #: Options that say where a result is read or written, and not what it is.
-_PLACES = ("--out", "--readme", "--page", "--from", "--jobs", "--cache")
+_PLACES = ("--out", "--readme", "--page", "--from", "--keep", "--jobs", "--cache")
 
 
 def build_parser(words: Sequence[str] = ()) -> argparse.ArgumentParser:

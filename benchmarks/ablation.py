@@ -22,9 +22,10 @@ from benchmarks.judging import CAUSAL, HEADLINE
 from benchmarks.layouts import LayoutOptions, read_sets
 from benchmarks.leaving_out import NEAR_SPREAD
 from benchmarks.provenance import provenance
-from benchmarks.recordings import RecordingSet, simulated
+from benchmarks.recordings import RecordingSet
+from benchmarks.simulated_sets import simulated
 from jeat_graph.config.argument_types import counting, natural, positive
-from jeat_graph.config.reading import load_config
+from jeat_graph.config.reading import config_to_dict, load_config
 from jeat_graph.data.processes import available_cores
 from jeat_graph.filters.model_constants import ModelConstants
 
@@ -110,7 +111,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     command = args.words.replace(args.root, "ROOT")
     return {
         "benchmark": _NAME,
-        **provenance(settings, {"default": load_config("default")}),
+        **provenance(settings, {"default": config_to_dict(load_config("default"))}),
         "command": command,
         "rows": rows,
     }

@@ -31,7 +31,7 @@ from benchmarks.leaving_out import (
 )
 from benchmarks.provenance import provenance
 from jeat_graph.config.argument_types import counting, natural, positive
-from jeat_graph.config.reading import load_config
+from jeat_graph.config.reading import config_to_dict, load_config
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.processes import available_cores
 
@@ -106,7 +106,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     settings = {"steps": steps, "nearby": _NEARBY, "seeds": args.seeds or [0], "sweeps": args.sweeps}
     return {
         "benchmark": _NAME,
-        **provenance(settings, {"default": load_config("default")}),
+        **provenance(settings, {"default": config_to_dict(load_config("default"))}),
         "command": _command(args),
         "left_out": TECHNICAL,
         **found,

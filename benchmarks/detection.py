@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks import common
-from benchmarks.judging import in_processes
+from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from benchmarks.raw_options import NONE, add_raw, detectors_of, findings
 from benchmarks.raw_segments import SENSORS, RawFound, described, find_in, segments_in
@@ -29,12 +29,6 @@ SIDES = {"below 12 px": (0.0, 12.0), "12 to 32 px": (12.0, 32.0), "above 32 px":
 ALL, MOVED = "all", "that moved"
 #: Who has gone less (px) in the time (s) before an instant, that is of few events, does not count as moved.
 _LEAST_WAY_PX, _BEFORE_S = 1.0, 0.2
-#: What the paper's detectors reach (AP50, per cent) on its own data: everything, and without light.
-PAPER = {
-    "YOLOv11, pictures": (83.46, 46.32),
-    "RVT, events": (65.11, 63.71),
-    "DAGR, both": (67.72, 65.34),
-}
 #: Average precision is over all scores; what is certainly wrong only takes time.
 _EVERY_SCORE = ("model_frames.score=0.01", "model_events.score=0.01", "model_fused.score=0.01")
 _KEYS = ("AP50", "AP")
@@ -135,25 +129,17 @@ def _ap(
 
 
 def tables(result: Mapping[str, Any]) -> dict[str, Table]:
-    """Tables of a result, by the name of their markers."""
+    """The table of a result, by the name of its markers."""
     from jeat_graph.eval.tables import Table
 
     records: list[dict[str, Cell]] = []
     for one in result["records"]:
         record: dict[str, Cell] = {"detector": one["detector"], "sensor": one["sensor"]}
         record |= {name: _cell(group) for name, group in one["groups"].items()}
-        records.append(record | {"scans a s": round(one["scans_per_cpu_s"], 1)})
+        records.append(record | {"scans a s": one["scans_per_cpu_s"]})
     columns = list(dict.fromkeys(key for record in records for key in record))
     title = "AP50 ± over segments / AP50:95 (%), and scans a second of one core"
-    paper: list[dict[str, Cell]] = [
-        {"detector": name, "all": every, "no light": dark} for name, (every, dark) in PAPER.items()
-    ]
-    return {
-        "detection": Table.from_records(records, columns, title=title),
-        "detection-paper": Table.from_records(
-            paper, title="AP50 of the paper's detectors on the paper's data (%)"
-        ),
-    }
+    return {"detection": Table.from_records(records, columns, title=title, digits={"scans a s": 1})}
 
 
 def _cell(group: Mapping[str, Any]) -> str | None:

@@ -1,29 +1,19 @@
-"""`python -m benchmarks events`: decoding beside others, noise of the event cameras, what vehicles give."""
+"""`python -m benchmarks events`: events a second of decoders and representations, beside other packages."""
 
 from __future__ import annotations
 
 import argparse
-import dataclasses
-import math
 from collections.abc import Mapping
-from statistics import mean
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import common
-from benchmarks.event_noise import BASELINE, measure_noise
-from benchmarks.event_rates import SPEEDS, measure_rates
 from benchmarks.event_throughput import HISTOGRAM, OURS, PEERS, SURFACE, measure_throughput
-from benchmarks.judging import in_processes
 from benchmarks.provenance import provenance
-from jeat_graph.config.argument_types import counting, drawn_size, positive
-from jeat_graph.config.section_tree import plain
-from jeat_graph_sehn.simulation.imaging.config import load_imaging
+from jeat_graph.config.argument_types import counting, drawn_size, natural
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
-_SCENARIOS = ("day", "night", "night-nolight")
-_THROUGHPUT, _NOISE, _MOTION = PARTS = ("throughput", "noise", "motion")
 _REPEATS = 7
 _TASKS = {
     "evt3": "decode EVT3",
@@ -36,69 +26,32 @@ _TASKS = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the benchmark's arguments."""
-    common.declare(
-        parser, "events", {"seeds": "of the segments (0)", "scenarios": f"({' '.join(_SCENARIOS)})"}
-    )
-    parser.set_defaults(seeds=[0], scenarios=_SCENARIOS)
+    common.declare(parser, "events", {"quick": "a short stream: to see that it runs"})
     add = parser.add_argument
-    add("--parts", nargs="+", choices=PARTS, default=PARTS, help="tables to make (all)", metavar="PART")
     add("--stream", type=counting, default=2_000_000, metavar="N", help="events that are decoded (2000000)")
-    add("--frames", type=counting, default=30, metavar="N", help="of each segment, 20 a second (30)")
     add("--size", type=drawn_size, default=(640, 384), metavar="WxH", help="picture (640x384)")
-    add("--tick", type=positive, default=100.0, metavar="HZ", help="rate of CARLA's ticks (100)")
-    add("--sigma", type=positive, default=0.1, metavar="S", help="σ_C that the first measure sets to 0 (0.1)")
-    add("--quick", action="store_true", help="one scenario, 6 small pictures: to see that it runs")
-    add("--grain", type=positive, default=0.5, metavar="DN", help="flicker of CARLA's picture, std (0.5)")
+    add("--seed", type=natural, default=0, metavar="N", help="of the stream (0)")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
     if args.quick:
-        args.scenarios, args.seeds, args.frames, args.size = _SCENARIOS[1:2], args.seeds[:1], 6, (160, 96)
-        args.stream = min(args.stream, 100_000)
+        args.stream, args.size = min(args.stream, 100_000), (160, 96)
     return common.measure_or_read(args, "events", measure, tables)
 
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:
-    """Decode a stream, and look at every segment with both cameras."""
-    imaging = load_imaging(
-        {
-            "render": {"width": args.size[0], "height": args.size[1]},
-            "carla": {"tick_hz": args.tick, "sigma_threshold": args.sigma, "render_noise_dn": args.grain},
-        }
-    )
-    ticks = max(2, round(args.frames * args.tick / imaging.rgb.rate_hz))
-    pairs = [(name, seed) for name in args.scenarios for seed in args.seeds]
-    settings = {"scenarios": list(args.scenarios), "seeds": list(args.seeds), "frames": args.frames}
-    settings |= {"stream": args.stream, "size": list(args.size)}
-    result = {
+    """Decode a stream, and make of it what the packages offer."""
+    settings = {"stream": args.stream, "size": list(args.size), "seed": args.seed}
+    return {
         "benchmark": "events",
         **provenance(settings, {}),
-        "imaging": plain(dataclasses.asdict(imaging)),
+        "throughput": measure_throughput(args.stream, args.size, args.seed, _REPEATS),
     }
-    if _THROUGHPUT in args.parts:
-        result["throughput"] = measure_throughput(args.stream, args.size, args.seeds[0], _REPEATS)
-    if _NOISE in args.parts:
-        jobs = [(name, seed, ticks, imaging) for name, seed in pairs]
-        noise = in_processes(measure_noise, jobs, args.jobs, "CARLA's sensor")
-        result["noise"] = [record for part in noise for record in part]
-    if _MOTION in args.parts:
-        jobs = [(name, seed, args.frames, imaging) for name, seed in pairs]
-        result["rates"] = in_processes(measure_rates, jobs, args.jobs, "event camera")
-    return result
 
 
 def tables(result: Mapping[str, Any]) -> dict[str, Table]:
-    """Tables of a result, by the name of their markers."""
-    made = {
-        "events-throughput": ("throughput", _throughput_table),
-        "events-noise": ("noise", _noise_table),
-        "events-speed": ("rates", _speed_table),
-    }
-    return {name: table(result) for name, (part, table) in made.items() if part in result}
-
-
-def _throughput_table(result: Mapping[str, Any]) -> Table:
+    """The table of a result, by the name of its markers."""
     from jeat_graph.eval.tables import Table
 
     found = {(r["task"], r["package"]): r for r in result["throughput"]}
@@ -114,57 +67,4 @@ def _throughput_table(result: Mapping[str, Any]) -> Table:
         f"{name} {result['packages'][name]}" for name in PEERS if result["packages"].get(name)
     )
     title = f"Decoding and representations, one thread ({versions or 'no other package installed'})"
-    return Table.from_records(records, title=title)
-
-
-def _noise_table(result: Mapping[str, Any]) -> Table:
-    from jeat_graph.eval.tables import Table
-
-    records: list[dict[str, Cell]] = []
-    for scenario in result["settings"]["scenarios"]:
-        mine = [r for r in result["noise"] if r["scenario"] == scenario]
-        before = mean(r["noise_hz"] for r in mine if r["row"] == BASELINE)
-        for row in dict.fromkeys(r["row"] for r in mine):
-            of_row = [r for r in mine if r["row"] == row]
-            noise = mean(r["noise_hz"] for r in of_row)
-            records.append(
-                {
-                    "light": scenario,
-                    "CARLA's sensor": row,
-                    "noise (Hz/px)": noise,
-                    "noise ÷": before / noise if noise > 0.0 else None,
-                    "motion (Hz/px)": mean(r["motion_hz"] for r in of_row),
-                    "kept, by count (%)": 100.0 * mean(r["kept"] for r in of_row),
-                    "kept, one by one (%)": 100.0 * mean(r["matched"] for r in of_row),
-                    "of the ideal's (%)": 100.0 * mean(r["ideal"] for r in of_row),
-                }
-            )
-    digits = {"noise (Hz/px)": 3, "noise ÷": 1, "motion (Hz/px)": 3}
-    digits |= dict.fromkeys(("kept, by count (%)", "kept, one by one (%)", "of the ideal's (%)"), 1)
-    return Table.from_records(
-        records, title="Noise of CARLA's event sensor and the paper's three measures", digits=digits
-    )
-
-
-def _speed_table(result: Mapping[str, Any]) -> Table:
-    from jeat_graph.eval.tables import Table
-
-    records: list[dict[str, Cell]] = []
-    for scenario in result["settings"]["scenarios"]:
-        mine = [r for r in result["rates"] if r["scenario"] == scenario]
-        for k, low in enumerate(SPEEDS[:-1]):
-            sums = {key: sum(r["classes"][k][key] for r in mine) for key in mine[0]["classes"][k]}
-            high = SPEEDS[k + 1]
-            swept, seconds = sums["swept_px"], sums["seconds"]
-            records.append(
-                {
-                    "light": scenario,
-                    "image speed (px/s)": f"{low:g} to {high:g}" if math.isfinite(high) else f"from {low:g}",
-                    "vehicle seconds": seconds,
-                    "events a vehicle (kHz)": 1e-3 * sums["events"] / seconds if seconds else None,
-                    "contrast (ln)": mine[0]["threshold"] * sums["events"] / swept if swept > 1.0 else None,
-                    "noise (Hz/px)": mean(r["noise_hz"] for r in mine),
-                }
-            )
-    digits = {"vehicle seconds": 1, "noise (Hz/px)": 3}
-    return Table.from_records(records, title="Events of moving vehicles, physical camera", digits=digits)
+    return {"events-throughput": Table.from_records(records, title=title)}

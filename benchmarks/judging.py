@@ -1,31 +1,25 @@
-"""Tracks and judges sets of recordings, in several processes; the result does not depend on how many."""
+"""Tracks and judges sets of recordings."""
 
 from __future__ import annotations
 
-import os
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import mean, stdev
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from benchmarks.recordings import JudgedRecording, RecordingSet
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections
-from jeat_graph.data.processes import worker_pool
 from jeat_graph.data.trajectories import Trajectories
 
-METRICS = ("MOTA", "MOTP", "HOTA", "IDF1")
 #: What a tracker is judged by where three numbers have to do, in this order in every table.
 HEADLINE = ("MOTA", "HOTA", "IDF1")
 CAUSAL, SMOOTHED = "causal", "smoothed"
 #: Of an altered copy so many boxes are left out; left, top, width and height change by so much of a side (one
 #: σ).
 LEFT_OUT, MOVED = 0.03, 0.005
-_Job = TypeVar("_Job")
-_Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
@@ -147,27 +141,6 @@ def altered(one: JudgedRecording, rng: np.random.Generator) -> JudgedRecording:
         size=detections.boxes.shape
     )
     return replace(one, detections=replace(detections, boxes=boxes).where(kept))
-
-
-def in_processes(
-    function: Callable[[_Job], _Result], jobs: Sequence[_Job], workers: int | None, label: str
-) -> list[_Result]:
-    """Apply a function to jobs in several processes, with a progress bar; results in the order of the jobs.
-
-    Args:
-        function: at top level of a module, so that it can be sent.
-        jobs: its arguments.
-        workers: processes; by default as many as there are processors.
-        label: of the progress bar.
-    """
-    from tqdm import tqdm
-
-    count = min(workers or os.cpu_count() or 1, max(len(jobs), 1))
-    bar: dict[str, Any] = {"total": len(jobs), "desc": label, "disable": None, "file": sys.stderr}
-    if count == 1:
-        return [function(job) for job in tqdm(jobs, **bar)]
-    with worker_pool(count) as pool:
-        return list(tqdm(pool.map(function, jobs), **bar))
 
 
 def spread_text(values: Sequence[float]) -> str:

@@ -11,8 +11,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.config.reading import config_to_dict
-from jeat_graph.config.schema import Config
 from jeat_graph.version import __version__
 
 _PACKAGES = ("numpy", "scipy", "gtsam", "trackers", "norfair", "supervision", "evt3", "evlib")
@@ -21,12 +19,12 @@ _ROOT = Path(__file__).resolve().parents[1]
 _IMPORTED = ("jeat_graph", "filters", "association", "smoothers", "eval", "configs", "benchmarks", "sehn")
 
 
-def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> dict[str, Any]:
+def provenance(settings: Mapping[str, Any], configs: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Collect what stands at the head of a benchmark's JSON.
 
     Args:
         settings: arguments of the benchmark.
-        configs: full configurations by name.
+        configs: full configurations by name, as `config_to_dict` gives them.
     """
     return {
         "jeat_graph": __version__,
@@ -39,7 +37,7 @@ def provenance(settings: Mapping[str, Any], configs: Mapping[str, Config]) -> di
             "cores": os.cpu_count(),
         },
         "settings": dict(settings),
-        "configs": {name: config_to_dict(config) for name, config in configs.items()},
+        "configs": dict(configs),
     }
 
 

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import common
 from benchmarks.baselines import peers_here
-from benchmarks.judging import METRICS, in_processes
+from benchmarks.kept import kept_or_found
+from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from benchmarks.raw_options import add_raw, detectors_of, findings
-from benchmarks.raw_segments import SENSORS, RawFound, RawSegment, described, find_in, segments_in
+from benchmarks.raw_segments import SENSORS, RawFound, RawSegment, described, segments_in
 from benchmarks.recordings import JudgedRecording
-from jeat_graph.config.reading import load_config
+from jeat_graph.config.reading import config_to_dict, load_config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.declared import declared_settings
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 _JOINED_PERIODS = 1.5
 BYTETRACK, PAPER = "ByteTrack", "paper"
 CAUSAL, SMOOTHED = "causal", "smoothed"
+_METRICS = ("MOTA", "MOTP", "HOTA", "IDF1")
 _ALL = "all"
 
 
@@ -78,6 +80,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--presets", nargs="+", default=["default"], metavar="NAME", help="of our tracker (default: default)"
     )
     parser.add_argument("--no-peers", action="store_true", help="leave ByteTrack out")
+    parser.add_argument(
+        "--keep",
+        metavar="DIR",
+        help="keep there what detectors find, and take what the same ones found in the same segments",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -95,7 +102,9 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         )
     configs = {name: load_config(name) for name in (*args.presets, PAPER)}
     with_peers = not args.no_peers and "bytetrack" in peers_here()
-    found = in_processes(find_in, findings(args, segments), args.jobs, "detecting")
+    found = in_processes(
+        kept_or_found, [(one, args.keep) for one in findings(args, segments)], args.jobs, "detecting"
+    )
     recordings = _recordings(found)
     rows = [
         row
@@ -113,7 +122,7 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     }
     return {
         "benchmark": "raw",
-        **provenance(settings, configs),
+        **provenance(settings, {name: config_to_dict(one) for name, one in configs.items()}),
         "sources": list(dict.fromkeys(s.source for s in segments)),
         "records": [record for part in records for record in part],
     }
@@ -172,7 +181,7 @@ def _judge(job: tuple[Row, dict[str, list[JudgedRecording]]]) -> list[dict[str, 
         for kind in tracked[group[0].name]:
             scores = _scores(group, [tracked[one.name][kind] for one in group], row, kind)
             each = [_scores([one], [tracked[one.name][kind]], row, kind) for one in group]
-            spread = {m: stdev([e[m] for e in each]) if len(each) > 1 else 0.0 for m in METRICS}
+            spread = {m: stdev([e[m] for e in each]) if len(each) > 1 else 0.0 for m in _METRICS}
             out.append(
                 {
                     "row": str(row) + (", smoothed" if kind == SMOOTHED else ""),
@@ -264,10 +273,10 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     for one in result["records"]:
         several = one["segments"] > 1
         cell = " / ".join(
-            f"{one['scores'][m]:.1f}" + (f"±{one['std'][m]:.0f}" if several else "") for m in METRICS
+            f"{one['scores'][m]:.1f}" + (f"±{one['std'][m]:.0f}" if several else "") for m in _METRICS
         )
         cells.setdefault(one["row"], {"": one["row"]})[one["source"]] = cell
-    title = f"From raw pictures and events: {' / '.join(METRICS)}, segments pooled (± over segments)"
+    title = f"From raw pictures and events: {' / '.join(_METRICS)}, segments pooled (± over segments)"
     honest: dict[str, dict[str, Cell]] = {
         one["row"]: {
             "": one["row"],

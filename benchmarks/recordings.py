@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
-
-SCENARIOS = ("day", "night", "night-nolight")
-SEEDS = (0, 1, 2, 3, 4)
-DURATION_S = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +60,3 @@ class RecordingSet:
         """What a tracker is given in turn: all detectors, then each alone."""
         alone: list[tuple[str, ...]] = [(name,) for name in self.sensors]
         return alone if len(alone) == 1 else [self.sensors, *alone]
-
-
-@lru_cache(maxsize=8)
-def simulated(scenario: str, seed: int, duration_s: float = DURATION_S) -> JudgedRecording:
-    """Simulate a recording; the last few are kept."""
-    from jeat_graph_sehn.simulation.scenario import load_scenario
-    from jeat_graph_sehn.simulation.simulate import simulate
-
-    detections, truth = simulate(load_scenario(scenario), seed=seed, duration_s=duration_s)
-    return JudgedRecording(f"{scenario}/{seed}", detections, truth)

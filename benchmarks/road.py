@@ -1,13 +1,11 @@
-"""`python -m benchmarks road`: place and speed on the road, and whether what is said of their errors is true.
+"""`python -m benchmarks road`: place and speed on simulated roads, and whether their stated errors are true.
 
-Simulated scenes with the exact camera, and with one that is wrong by what its covariance says; real highways
-against laser gates, with all measured lengths and with two.
+With the exact camera, and with one that is wrong by what its covariance says. Real roads are `road-real`.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,11 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks import common
-from benchmarks.judging import in_processes
+from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from benchmarks.road_cost import road_costs
-from benchmarks.road_real import LENGTH_SETS, find_brno, judge_camera, speed_scores
-from jeat_graph.config.reading import load_config
+from jeat_graph.config.reading import config_to_dict, load_config
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
@@ -30,7 +27,6 @@ _SCENARIOS = ("day", "night", "night-nolight")
 _CAMERAS = ("exact", "perturbed")
 _DURATION_S, _QUICK_DURATION_S = 30.0, 6.0
 _COST_DURATION_S = 15.0
-_EVERY_MINUTES, _QUICK_EVERY = 3, 20
 # A perturbed camera: standard deviations of focal length (1), direction (rad) and height (m).
 _SPREAD = {"log_f": 0.005, "turn_x": 0.001, "turn_y": 0.001, "turn_z": 0.003, "z": 0.04}
 
@@ -38,10 +34,9 @@ _SPREAD = {"log_f": 0.005, "turn_x": 0.001, "turn_y": 0.001, "turn_z": 0.003, "z
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the benchmark's arguments."""
     texts = {
-        "data": "folder that holds brno/ (../shared/data)",
         "seeds": "of the simulated recordings (21 22)",
         "duration": f"of a simulated recording ({_DURATION_S:g})",
-        "quick": "one seed, 6 s, few real vehicles: to see that it runs",
+        "quick": "one seed, 6 s: to see that it runs",
     }
     common.declare(parser, "road", texts)
 
@@ -52,33 +47,21 @@ def run(args: argparse.Namespace) -> int:
 
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:
-    """Simulate, track, judge; calibrate and judge the real cameras."""
-    data = Path(args.data or "../shared/data")
-    folders = find_brno(data)
-    if not folders:
-        print(f"no real recordings in {data / 'brno'}: only simulated ones are judged", file=sys.stderr)
+    """Simulate, track, judge."""
     settings: dict[str, Any] = {
         "seeds": list(args.seeds or ((21,) if args.quick else (21, 22))),
         "duration_s": args.duration or (_QUICK_DURATION_S if args.quick else _DURATION_S),
-        "every_minutes": _QUICK_EVERY if args.quick else _EVERY_MINUTES,
     }
     scenes = [
         (scenario, seed, settings["duration_s"]) for scenario in _SCENARIOS for seed in settings["seeds"]
     ]
     simulated = in_processes(judge_scene, scenes, args.jobs, "simulated roads")
-    sets = LENGTH_SETS[:1] if args.quick else LENGTH_SETS
-    jobs = [(folder, which, settings["every_minutes"]) for which in sets for folder in folders]
     return {
         "benchmark": "road",
-        **provenance(settings, {"default": load_config("default")}),
+        **provenance(settings, {"default": config_to_dict(load_config("default"))}),
         "simulated": [one for scene in simulated for one in scene],
-        "real": in_processes(_judge_real, jobs, args.jobs, "real cameras"),
         "costs": road_costs(_QUICK_DURATION_S if args.quick else _COST_DURATION_S),
     }
-
-
-def _judge_real(job: tuple[Path, str, int]) -> dict[str, Any]:
-    return judge_camera(*job)
 
 
 def judge_scene(job: tuple[str, int, float]) -> list[dict[str, Any]]:
@@ -127,23 +110,11 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     """Tables of a result, by the name of their markers."""
     from jeat_graph.eval.tables import Table
 
-    found = {"road-simulated": simulated_table(result["simulated"])}
-    for which in dict.fromkeys(one["lengths"] for one in result["real"]):
-        rows = [one for one in result["real"] if one["lengths"] == which and one["vehicles"]]
-        errors = np.concatenate([np.zeros(0), *(one["errors"] for one in rows)])
-        pooled = speed_scores(errors, np.ones(len(errors))) | {"held": None, "sigma_kmh": None}
-        columns = ("vehicles", "mean_kmh", "median_kmh", "p95_kmh", "bias_kmh", "sigma_kmh", "held")
-        records: list[dict[str, Cell]] = [
-            {"camera": one.get("camera", "all"), **{name: one.get(name) for name in columns}}
-            for one in [*rows, pooled]
-        ]
-        title = f"Real highways, lengths: {which} (km/h; held: % of the 95 % intervals)"
-        key = f"road-real-{which.replace(', ', '-').replace(' ', '-')}"
-        found[key] = Table.from_records(records, title=title, digits={"held": 1})
     title = "Cost (share: of a tracker's step; real time: seconds of a recording per second of CPU time)"
-    if result.get("costs"):
-        found["road-cost"] = Table.from_records(result["costs"], title=title)
-    return found
+    return {
+        "road-simulated": simulated_table(result["simulated"]),
+        "road-cost": Table.from_records(result["costs"], title=title),
+    }
 
 
 def simulated_table(rows: Sequence[Mapping[str, Any]]) -> Table:

@@ -1,21 +1,35 @@
-"""Speeds on real highways against laser gates: cameras calibrated from measured lengths and tracks alone."""
+"""`python -m benchmarks road-real`: speeds on real highways against laser gates.
+
+Cameras are calibrated from measured lengths and tracks alone, with all of the lengths and with two.
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from benchmarks import common
+from benchmarks.processes import in_processes
+from benchmarks.provenance import provenance
+from jeat_graph.config.argument_types import counting
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.eval.road import share_held
 from jeat_graph.io.tables.file_tables import read_table
+
+if TYPE_CHECKING:
+    from jeat_graph.eval.tables import Cell, Table
 
 #: Which of the measured lengths are used.
 LENGTH_SETS = ("all", "two along", "one along, one across")
 _NEAR_S, _LEAST_S = 0.12, 0.8
 _COARSE_S = (0.25, 0.6)
+_QUICK_EVERY = 20
 
 
 class Gates(NamedTuple):
@@ -30,9 +44,60 @@ class Gates(NamedTuple):
     times: FloatArray
 
 
-def find_brno(data: Path) -> list[Path]:
-    """Folders of the recordings; none where they are not there."""
-    return sorted(p.parent for p in (data / "brno").glob("*/points.csv.gz"))
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the benchmark's arguments."""
+    common.declare(
+        parser, "road-real", {"quick": "vehicles of every 20th minute, all lengths: to see it run"}
+    )
+    add = parser.add_argument
+    add("root", nargs="?", metavar="ROOT", help="folder of the cameras, each with points, lengths and speeds")
+    add("--every", type=counting, default=3, metavar="N", help="vehicles of every Nth minute are judged (3)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure (or read an earlier result), print and write."""
+    return common.measure_or_read(args, "road-real", measure, tables)
+
+
+def measure(args: argparse.Namespace) -> dict[str, Any]:
+    """Calibrate the cameras and judge the speeds.
+
+    Raises:
+        ConfigError: no folder is given.
+        DataError: it holds no cameras.
+    """
+    if args.root is None:
+        raise ConfigError("give ROOT: the folder of the cameras")
+    folders = sorted(p.parent for p in Path(args.root).glob("*/points.csv.gz"))
+    if not folders:
+        raise DataError("holds no cameras: folders with points.csv.gz, lengths.csv and speeds.csv", args.root)
+    sets, every = (LENGTH_SETS[:1], _QUICK_EVERY) if args.quick else (LENGTH_SETS, args.every)
+    jobs = [(folder, which, every) for which in sets for folder in folders]
+    return {
+        "benchmark": "road-real",
+        **provenance({"every_minutes": every}, {}),
+        "real": in_processes(_judged, jobs, args.jobs, "real cameras"),
+    }
+
+
+def tables(result: Mapping[str, Any]) -> dict[str, Table]:
+    """Tables of a result, by the name of their markers: one for each set of lengths."""
+    from jeat_graph.eval.tables import Table
+
+    found = {}
+    for which in dict.fromkeys(one["lengths"] for one in result["real"]):
+        rows = [one for one in result["real"] if one["lengths"] == which and one["vehicles"]]
+        errors = np.concatenate([np.zeros(0), *(one["errors"] for one in rows)])
+        pooled = speed_scores(errors, np.ones(len(errors))) | {"held": None, "sigma_kmh": None}
+        columns = ("vehicles", "mean_kmh", "median_kmh", "p95_kmh", "bias_kmh", "sigma_kmh", "held")
+        records: list[dict[str, Cell]] = [
+            {"camera": one.get("camera", "all"), **{name: one.get(name) for name in columns}}
+            for one in [*rows, pooled]
+        ]
+        title = f"Real highways, lengths: {which} (km/h; held: % of the 95 % intervals)"
+        key = f"road-real-{which.replace(', ', '-').replace(' ', '-')}"
+        found[key] = Table.from_records(records, title=title, digits={"held": 1})
+    return found
 
 
 def chosen_lengths(along: BoolArray, which: str) -> IntArray:
@@ -43,6 +108,10 @@ def chosen_lengths(along: BoolArray, which: str) -> IntArray:
     if which == "one along, one across":
         return np.concatenate([ways[0][-1:], ways[1][:1]])
     return np.arange(len(along))
+
+
+def _judged(job: tuple[Path, str, int]) -> dict[str, Any]:
+    return judge_camera(*job)
 
 
 def judge_camera(folder: Path, which: str, every: int) -> dict[str, Any]:

@@ -1,37 +1,34 @@
-"""Sets of simulated recordings: highways, worlds beside the highway, and odd detectors on it."""
+"""`python -m benchmarks simulated`: trackers on highways, streets and squares, and with odd detectors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import argparse
 
-from benchmarks.foreign import recorded, worlds
-from benchmarks.recordings import SCENARIOS, JudgedRecording, RecordingSet, simulated
-from benchmarks.robustness import variations, varied
-from jeat_graph.data.errors import ConfigError
+from benchmarks import tables
+from benchmarks.recordings import RecordingSet
+from benchmarks.simulated_sets import DURATION_S, simulated_sets
+
+_SEEDS = (0, 1, 2, 3, 4)
+_QUICK_S = 4.0
 
 
-def simulated_sets(
-    names: Sequence[str] | None, seeds: Sequence[int], duration_s: float
-) -> list[RecordingSet]:
-    """Simulate sets of recordings, one recording a seed.
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the benchmark's arguments."""
+    texts = {"seeds": "of the recordings (0 1 2 3 4)", "duration": f"of a recording ({DURATION_S:g})"}
+    tables.declare_trackers(parser, "simulated", texts)
+    parser.add_argument(
+        "--worlds",
+        nargs="+",
+        metavar="NAME",
+        help="judge these alone (all scenarios, streets and odd detectors)",
+    )
 
-    Args:
-        names: of scenarios, worlds and variations; all of them by default.
-        seeds: of the recordings.
-        duration_s: of each (s).
 
-    Raises:
-        ConfigError: an unknown name.
-    """
-    sources: dict[str, Callable[[str, int, float], JudgedRecording]] = {
-        **dict.fromkeys(SCENARIOS, simulated),
-        **dict.fromkeys((world.name for world in worlds()), recorded),
-        **dict.fromkeys((one.name for one in variations()), varied),
-    }
-    for name in names or ():
-        if name not in sources:
-            raise ConfigError(f"unknown world {name!r}; there are: {', '.join(sources)}")
-    return [
-        RecordingSet(name, tuple(sources[name](name, seed, duration_s) for seed in seeds))
-        for name in names or sources
-    ]
+def run(args: argparse.Namespace) -> int:
+    """Measure (or read an earlier result), print and write."""
+    return tables.judge_sets(args, _sets)
+
+
+def _sets(args: argparse.Namespace) -> list[RecordingSet]:
+    seeds = tuple(args.seeds or _SEEDS)[: tables.most_recordings(args)]
+    return simulated_sets(args.worlds, seeds, args.duration or (_QUICK_S if args.quick else DURATION_S))

@@ -1,7 +1,8 @@
 """Which files a module of this checkout imports, directly and through others, read from their text.
 
 Imports inside functions count, those for type checkers alone do not. Names that a package hands on count as
-the module that they come from. What is compiled, and data that modules read, count by folder.
+the module that they come from. Of what is compiled, the imported folders count, with the headers that they
+include; the data that a module reads count by folder.
 """
 
 from __future__ import annotations
@@ -25,11 +26,14 @@ _HOMES = {
 }
 #: Files that are read but not imported, by the package whose import means them.
 _DATA = {
-    "jeat_graph.core": ("jeat_graph/core", ("*.?pp", "CMakeLists.txt")),
-    "jeat_graph.config": ("configs", ("*.yaml",)),
+    "jeat_graph.configs": ("configs", ("*.yaml",)),
     "jeat_graph.detection.network_cache": ("jeat_graph/detection/weights", ("*",)),
-    "jeat_graph_sehn": ("sehn/jeat_graph_sehn/scenarios", ("*.yaml",)),
+    "jeat_graph_sehn.simulation.scenario": ("sehn/jeat_graph_sehn/scenarios", ("*.yaml",)),
 }
+#: The compiled package: each folder is a submodule, bound by its `module.cpp`; these files belong to all.
+_CORE = "jeat_graph.core"
+_BUILT_BY = ("module.cpp", "CMakeLists.txt")
+_INCLUDED = re.compile(r'^\s*#include "([^"]+)"', re.MULTILINE)
 #: A module that is named in a text, to be run or imported later.
 _NAMED = re.compile(r"(?:benchmarks|jeat_graph|jeat_graph_sehn)(?:\.\w+)+")
 
@@ -54,6 +58,7 @@ def sources_of(module: str) -> frozenset[str]:
         found.add(name)
         waiting += [one for one in (*_parents(name), *_imported(name)) if one not in found]
     files = {path for name in found if (path := _file(name)) is not None}
+    files |= _compiled({path for path in files if path.suffix == ".cpp"})
     for name, (folder, patterns) in _DATA.items():
         if any(one == name or one.startswith(f"{name}.") for one in found):
             files |= {
@@ -75,14 +80,33 @@ def _file(module: str) -> Path | None:
     for home in sorted(_HOMES, key=len, reverse=True):
         if module == home or module.startswith(f"{home}."):
             path = _HOMES[home].joinpath(*module[len(home) :].split(".")[1:])
-            return next((p for p in (path / "__init__.py", path.with_suffix(".py")) if p.is_file()), None)
+            choices = [path / "__init__.py", path.with_suffix(".py")]
+            choices += [path / "module.cpp"] if module.startswith(f"{_CORE}.") else []
+            return next((p for p in choices if p.is_file()), None)
     return None
+
+
+def _compiled(sources: set[Path]) -> set[Path]:
+    """Files that a compiler reads for these sources of the core, and those that build all of it."""
+    core = ROOT.joinpath(*_CORE.split("."))
+    found: set[Path] = set()
+    waiting = [*sources, *(core / name for name in _BUILT_BY)] if sources else []
+    while waiting:
+        path = waiting.pop()
+        if path in found or not path.is_file():
+            continue
+        found.add(path)
+        names = _INCLUDED.findall(path.read_text(encoding="utf-8"))
+        waiting += [folder / name for name in names for folder in (path.parent, core)]
+    return found
 
 
 @cache
 def _tree(module: str) -> ast.Module:
     path = _file(module)
-    return ast.parse("" if path is None else path.read_text(encoding="utf-8"))
+    if path is None or path.suffix != ".py":
+        return ast.parse("")
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache

@@ -26,7 +26,7 @@ _HOUR = 60 * SCANS_A_MINUTE
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add = parser.add_argument
-    add("--out", metavar="DIR", help="write speed.json, speed.png and speed.svg there")
+    add("--out", metavar="DIR", help="write speed.json there")
     add("--objects", nargs="+", type=counting, default=list(OBJECTS), metavar="N", help="10 50 200 1000")
     add("--frames", type=counting, default=100, metavar="N", help="timed frames a repetition (100)")
     add("--warm-up", type=counting, default=30, metavar="N", help="frames before them (30)")
@@ -159,15 +159,12 @@ def _tables(result: dict[str, Any]) -> str:
 
 def _write(result: dict[str, Any], args: argparse.Namespace) -> None:
     from benchmarks.provenance import provenance
-    from jeat_graph.config.reading import load_config
-    from jeat_graph.drawing.speed import plot_speed
+    from jeat_graph.config.reading import config_to_dict, load_config
     from jeat_graph.io.files.atomic import open_atomic
 
     settings = {key: getattr(args, key) for key in ("objects", "frames", "warm_up", "repeats", "clock")}
-    head = provenance(settings, {name: load_config(name) for name in ("default", "paper")})
+    head = provenance(settings, {name: config_to_dict(load_config(name)) for name in ("default", "paper")})
     folder = Path(args.out)
     with open_atomic(folder / "speed.json") as file:
         json.dump({**head, **result}, file, indent=1)
         file.write("\n")
-    for suffix in ("png", "svg"):
-        plot_speed(result["steps"], folder / f"speed.{suffix}")

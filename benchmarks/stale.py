@@ -2,7 +2,8 @@
 
 A table or page says by which command and at which commit it was made (`provenance.made_by`). It is stale
 where the code that this command imports differs from that commit. Comments, docstrings and layout are no
-code; of what is not Python every byte counts. Packages, data and machine are not looked at.
+code; of what is not Python every byte counts. Packages, data and machine are not looked at. Figures that a
+page calls a record, with their commit, are of what cannot be made again, such as a training: not judged.
 """
 
 from __future__ import annotations
@@ -24,12 +25,10 @@ if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell
 
 _MADE = re.compile(
-    r"Made by\s+`(?:python -m benchmarks|jeat-graph) (?P<kind>[\w-]+)[^`]*`\s+"
+    r"Made by\s+`python -m benchmarks (?P<kind>[\w-]+)[^`]*`\s+"
     r"at commit\s+`(?P<commit>[0-9a-f]{7,40})`(?P<changes> with changes)?"
 )
 _TABLE = re.compile(r"<!-- table: ([\w-]+) -->\n(.*?)<!-- end -->", re.DOTALL)
-#: Commands of `jeat-graph` that pages are made by, and their modules.
-_COMMANDS = {"train": "jeat_graph_sehn.commands.train_command"}
 #: So many changed files are named.
 _NAMED = 3
 
@@ -68,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         ROOT / "README.md",
         *sorted((ROOT / "docs" / "benchmarks").glob("*.md")),
     ]
-    modules = {name: module for name, (module, _) in KINDS.items()} | _COMMANDS
+    modules = {name: module for name, (module, _) in KINDS.items()}
     entries = [entry for page in pages for entry in entries_of(page)]
     rows: list[dict[str, Cell]] = []
     fresh = 0

@@ -1,4 +1,4 @@
-"""`python -m benchmarks mot|kitti|mevdt|…|real|simulated`: trackers on sets of recordings.
+"""`python -m benchmarks mot|kitti|mevdt|…|real`: trackers on sets of recordings.
 
 Ours with a preset as it comes, and the peers with their defaults, on all detectors of a set and on each
 alone. Both of our tables are judged by all that `eval` knows.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,23 +20,23 @@ from benchmarks.judging import (
     SMOOTHED,
     Contender,
     JudgeJob,
-    in_processes,
     judge,
     spread_text,
 )
 from benchmarks.layouts import LayoutOptions, read_sets
 from benchmarks.page import write_page
+from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
-from benchmarks.recordings import DURATION_S, SEEDS, RecordingSet
+from benchmarks.recordings import RecordingSet
 from jeat_graph.config.argument_types import natural, positive
-from jeat_graph.config.reading import load_config
+from jeat_graph.config.reading import config_to_dict, load_config
 from jeat_graph.data.errors import ConfigError
 
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
 _SHARED = "../shared/data"
-_QUICK_S = 4.0
+_QUICK_RECORDINGS = 2
 #: What of a table is shown beside the headline, and its digits.
 _SHOWN = {"DetA": 1, "AssA": 1, "MOTP": 1, "FP": 0, "FN": 0, "IDSW": 0}
 _MOTION = ("position_rmse", "velocity_rmse", "acceleration_rmse", "nees")
@@ -45,36 +45,40 @@ _MOTION = ("position_rmse", "velocity_rmse", "acceleration_rmse", "nees")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of a kind, which is the last word of the parser's name."""
     kind = parser.prog.split()[-1]
-    texts = {"quick": "two recordings a set, no peers: to see that it runs"}
-    if kind == "simulated":
-        texts |= {"seeds": "of the recordings (0 1 2 3 4)", "duration": f"of a recording ({DURATION_S:g})"}
-    common.declare(parser, kind, texts)
+    declare_trackers(parser, kind)
     add = parser.add_argument
-    if kind == "simulated":
-        add(
-            "--worlds",
-            nargs="+",
-            metavar="NAME",
-            help="judge these alone (all scenarios, streets and odd detectors)",
-        )
-    else:
-        given: dict[str, Any] = {"nargs": "?", "default": _SHARED} if kind == "real" else {}
-        add(
-            "root",
-            metavar="ROOT",
-            help="folder of the recordings" + (f" ({_SHARED})" if given else ""),
-            **given,
-        )
-        add(
-            "--detections",
-            action="append",
-            default=[],
-            metavar="[NAME=]DIR",
-            help="a file of boxes a recording",
-        )
-        add("--rate", type=positive, metavar="HZ", help="frame rate where the files do not say it")
-        add("--classes", nargs="+", default=[], metavar="CLASS", help="objects to be found (all)")
-        add("--sets", nargs="+", metavar="NAME", help="judge these sets alone")
+    given: dict[str, Any] = {"nargs": "?", "default": _SHARED} if kind == "real" else {}
+    add(
+        "root",
+        metavar="ROOT",
+        help="folder of the recordings" + (f" ({_SHARED})" if given else ""),
+        **given,
+    )
+    add(
+        "--detections",
+        action="append",
+        default=[],
+        metavar="[NAME=]DIR",
+        help="a file of boxes a recording",
+    )
+    add("--rate", type=positive, metavar="HZ", help="frame rate where the files do not say it")
+    add("--classes", nargs="+", default=[], metavar="CLASS", help="objects to be found (all)")
+    add("--sets", nargs="+", metavar="NAME", help="judge these sets alone")
+
+
+def declare_trackers(
+    parser: argparse.ArgumentParser, kind: str, texts: Mapping[str, str] | None = None
+) -> None:
+    """Declare which trackers are judged, and how.
+
+    Args:
+        parser: of the benchmark.
+        kind: its name.
+        texts: help of the arguments that it has beside (`common.declare`).
+    """
+    quick = {"quick": f"{_QUICK_RECORDINGS} recordings a set, no peers: to see that it runs"}
+    common.declare(parser, kind, quick | dict(texts or {}))
+    add = parser.add_argument
     add("--config", nargs="+", default=["default"], metavar="NAME|FILE", help="presets of ours (default)")
     add(
         "--set",
@@ -97,7 +101,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure (or read an earlier result), print and write."""
-    result = common.earlier(args.source, args.kind) if args.source else measure(args)
+    return judge_sets(args, _sets)
+
+
+def judge_sets(args: argparse.Namespace, sets: Callable[[argparse.Namespace], list[RecordingSet]]) -> int:
+    """Judge all trackers on sets (or read an earlier result), print and write.
+
+    Args:
+        args: of the command.
+        sets: reads or makes the sets that it asks for.
+
+    Returns:
+        The exit code.
+    """
+    result = common.earlier(args.source, args.kind) if args.source else measure(args, sets)
     found = tables(result)
     common.publish(args, args.kind, result, found)
     if args.page:
@@ -106,12 +123,19 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def measure(args: argparse.Namespace) -> dict[str, Any]:
+def most_recordings(args: argparse.Namespace) -> int | None:
+    """Of a set so many recordings are judged at most; None for all."""
+    return _QUICK_RECORDINGS if args.quick else None
+
+
+def measure(
+    args: argparse.Namespace, sets: Callable[[argparse.Namespace], list[RecordingSet]]
+) -> dict[str, Any]:
     """Track and judge everything."""
     subjects = [Contender(Path(name).stem, name, tuple(args.changes)) for name in args.config]
     for one in subjects:
         load_config(one.config or "default", one.changes)  # a wrong key is said before hours of tracking
-    groups = _sets(args)
+    groups = sets(args)
     peers = [] if args.no_peers or args.quick else [Contender(NAMES[key], peer=key) for key in peers_here()]
     jobs = [
         JudgeJob(subject, group, stream, args.copies)
@@ -128,7 +152,8 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
     return {
         "benchmark": args.kind,
         **provenance(
-            settings, {one.name: load_config(one.config or "default", one.changes) for one in subjects}
+            settings,
+            {one.name: config_to_dict(load_config(one.config or "default", one.changes)) for one in subjects},
         ),
         "sets": [_described(group) for group in groups],
         "records": records,
@@ -136,15 +161,11 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _sets(args: argparse.Namespace) -> list[RecordingSet]:
-    most = 2 if args.quick else None
-    if args.kind == "simulated":
-        from benchmarks.simulated import simulated_sets
-
-        seeds = tuple(args.seeds or SEEDS)[:most]
-        return simulated_sets(args.worlds, seeds, args.duration or (_QUICK_S if args.quick else DURATION_S))
     folders = tuple(_named(text) for text in args.detections)
     layout = "mot" if args.kind == "real" else args.kind
-    how = LayoutOptions(folders, args.rate, tuple(args.classes), most, tuple(args.sets or ()))
+    how = LayoutOptions(
+        folders, args.rate, tuple(args.classes), most_recordings(args), tuple(args.sets or ())
+    )
     return read_sets(layout, Path(args.root), how)
 
 

@@ -185,6 +185,17 @@ def interval_edges(first: float, last: float, interval_s: float, times: Sequence
     return np.asarray(interval_s * np.arange(begin, end + 1), dtype=np.float64)
 
 
+def observed_s(begin: float, end: float, span: tuple[float, float]) -> float:
+    """Return how much of an interval a recording covers (s).
+
+    Args:
+        begin: of the interval (s).
+        end: of the interval (s).
+        span: begin and end of the recording (s).
+    """
+    return max(min(end, span[1]) - max(begin, span[0]), 0.0)
+
+
 def count(
     found: Sequence[LineCrossing],
     edges: FloatArray,

@@ -21,7 +21,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.eval.frames import IGNORE_COVERED
+from jeat_graph.eval.matching import IGNORE_COVERED
 
 THRESHOLDS: FloatArray = np.linspace(0.5, 0.95, 10)
 RECALLS: FloatArray = np.linspace(0.0, 1.0, 101)

@@ -21,6 +21,7 @@ from jeat_graph.association.overlap import pairwise_covered, pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.eval.matching import IGNORE_COVERED
 from jeat_graph.eval.matching import match as match
 from jeat_graph.eval.pairing import check_pair, check_truth
 from jeat_graph.eval.resampling import (
@@ -36,7 +37,6 @@ from jeat_graph.eval.resampling import (
 
 Kind = Literal["causal", "smoothed"]
 IGNORE_IOU = 0.5
-IGNORE_COVERED = 0.5
 
 
 @dataclass(frozen=True, eq=False)

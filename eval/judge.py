@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from jeat_graph.data.progress import progress_span, with_progress
@@ -110,11 +110,29 @@ def rows_beyond(judged: dict[str, Judgement], names: Sequence[str]) -> list[str]
 
 def summary_table(judged: dict[str, Judgement]) -> Table:
     """One row for each kind of table."""
-    columns = ["table", *SHARES, *COUNTS]
-    if any(one.errors for one in judged.values()):
-        columns += ERRORS
-    records: list[dict[str, Cell]] = [{"table": kind, **one.as_dict()} for kind, one in judged.items()]
-    return Table.from_records(records, columns)
+    return Table.from_records(
+        [{"table": kind, **one.as_dict()} for kind, one in judged.items()], ["table", *_scores_of(judged)]
+    )
+
+
+def summary_of_runs(judged: Mapping[str, dict[str, Judgement]]) -> Table:
+    """One row for each kind of table of each run.
+
+    Args:
+        judged: what `judge_runs` gave for each, by its name.
+    """
+    records: list[dict[str, Cell]] = [
+        {"run": name, "table": kind, **one.as_dict()}
+        for name, kinds in judged.items()
+        for kind, one in kinds.items()
+    ]
+    return Table.from_records(records, ["run", "table", *_scores_of(*judged.values())])
+
+
+def _scores_of(*judged: dict[str, Judgement]) -> list[str]:
+    """Names of the scores, with the errors of motion where any truth has it."""
+    moving = any(one.errors for kinds in judged for one in kinds.values())
+    return [*SHARES, *COUNTS, *(ERRORS if moving else ())]
 
 
 def breakdown_tables(judged: dict[str, Judgement], *, iou: float = 0.5) -> list[Table]:

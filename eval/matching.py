@@ -8,6 +8,9 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 
+#: A box that is matched to nothing counts as on an ignored one if this share of its area lies on it.
+IGNORE_COVERED = 0.5
+
 
 def match(iou: FloatArray, threshold: float) -> IntArray:
     """One-to-one match of largest total IoU among the pairs that reach `threshold`.

@@ -16,7 +16,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.eval.counting import Line, LineCrossing
+from jeat_graph.eval.counting import Line, LineCrossing, observed_s
 
 _S_PER_HOUR = 3600.0
 _PERCENT = 100.0
@@ -109,7 +109,7 @@ def stations(
             for begin, end in itertools.pairwise(edges.tolist()):
                 inside = np.flatnonzero((times >= begin) & (times < end))
                 own_rows = [rows[i] for i in inside]
-                seen = max(min(end, span[1]) - max(begin, span[0]), 0.0)
+                seen = observed_s(begin, end, span)
                 halves = [(found[k].t, covers_s[k] / 2.0) for k in own_rows]
                 stays = [(t - half, t + half) for t, half in halves]
                 records.append(

@@ -10,14 +10,15 @@
 With h hits and m misses in correlation times, BB their Beta-binomial, ch = ε^h (1 − ε)^m, BB' the first of
 those while it moved, ch' the second of those while it stood, and η_s the log odds by score:
 
-    ln w_real  = Σ_s ln[g_s ch + (1 − g_s) (b_s BB' ch' + (1 − b_s) BB)] + Σ_s η_s
+    ln w_real  = Σ_s ln[g_s ch e^(f_s η_s) + (1 − g_s) (b_s BB' ch' + (1 − b_s) BB) e^η_s]
                  + k ln(1 − o) / (1 + e^(max η − η₀))
-    ln w_false = ln Σ_s exp(ln BB_s + Σ_{s' ≠ s} (ln[(1 − c) ch + c BB]_{s'} + π_{s'}))
+    ln w_false = ln Σ_s exp(ln BB_s + Σ_{s' ≠ s} ln[(1 − c) ch e^(f π) + c BB e^π]_{s'})
     ln w_noise = ln ν/(1 − ν) − gained + Σ_{s ≠ first} π_s
 
-Every sensor's testimony is bounded: scores count once a track, and ln BB ~ −½ ln h only. (Gelman et al.,
-*Bayesian Data Analysis*, ch. 5, for the Beta-binomial; Musicki and Evans, IPDA, 1994, for existence.) N
-tracks, S sensors.
+with f 1 for the sensor that began the track and 0 for the others: what those find by chance has the scores of
+clutter, in every hypothesis. Every sensor's testimony is bounded: scores count once a track, and
+ln BB ~ −½ ln h only. (Gelman et al., *Bayesian Data Analysis*, ch. 5, for the Beta-binomial; Musicki and
+Evans, IPDA, 1994, for existence.) N tracks, S sensors.
 """
 
 from __future__ import annotations
@@ -145,7 +146,7 @@ def duplicate_log_odds(overlap: FloatArray, scores: FloatArray, c: ModelConstant
 def posterior(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> Posterior:
     """Weigh the hypotheses of each track by Bayes' rule, as the head of this module says."""
     w = _weights(evidence, sensors, c)
-    real = w.object_seen.sum(axis=1) + w.scores.sum(axis=1) + w.second_box
+    real = w.object_seen.sum(axis=1) + w.second_box
     not_real = np.logaddexp(np.logaddexp.reduce(w.false, axis=1), w.noise)
     log_odds = real - not_real
     return Posterior(
@@ -185,12 +186,15 @@ def _weights(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> _W
     # Who never stood is one that it sees, or does not.
     told = stood[0] + stood[1] > 0.0
     while_moving, at_times = np.where(told, while_moving, -np.inf), np.where(told, at_times, seen)
-    never = np.log(sensors.unseen) + chance
-    object_seen = np.logaddexp(never, np.log1p(-sensors.unseen) + at_times)
-    shared = np.logaddexp(math.log1p(-c.shared_false) + chance, math.log(c.shared_false) + seen)
     scores = score_log_odds(evidence, sensors, c)
     prior = np.where(found, sensors.prior_odds, 0.0)
-    others = (shared + prior).sum(axis=1)[:, None] - shared - prior
+    # What a sensor finds by chance has the scores of clutter; but no track begins by chance.
+    begins = np.arange(scores.shape[1]) == evidence.owner[:, None]
+    never = np.log(sensors.unseen) + chance + np.where(begins, scores, 0.0)
+    object_seen = np.logaddexp(never, np.log1p(-sensors.unseen) + at_times + scores)
+    by_chance = math.log1p(-c.shared_false) + chance + np.where(begins, prior, 0.0)
+    shared = np.logaddexp(by_chance, math.log(c.shared_false) + seen + prior)
+    others = shared.sum(axis=1)[:, None] - shared
     false = np.where(found, others + seen, -np.inf)
     odds = math.log(sensors.noise_share / (1.0 - sensors.noise_share))
     noise = odds - evidence.gained + prior.sum(axis=1) - prior[rows, evidence.owner]
@@ -214,7 +218,10 @@ def log_odds_terms(evidence: Evidence, sensors: SensorBelief, c: ModelConstants)
     is_noise = best == w.false.shape[1]
     other = np.where(is_noise, -1, best)
     # What each sensor's looks weigh under the other hypothesis.
-    against = w.shared + w.prior
+    against = w.shared.copy()
+    # Scores count as far as the sensor sees the object.
+    unscored = np.where(np.arange(w.scores.shape[1]) == evidence.owner[:, None], w.never - w.scores, w.never)
+    counted = w.object_seen - np.logaddexp(unscored, np.log1p(-sensors.unseen) + w.at_times)
     against[rows[~is_noise], other[~is_noise]] = w.seen[rows[~is_noise], other[~is_noise]]
     found_first = np.zeros_like(w.prior)
     found_first[rows, evidence.owner] = w.prior[rows, evidence.owner]
@@ -222,8 +229,8 @@ def log_odds_terms(evidence: Evidence, sensors: SensorBelief, c: ModelConstants)
     odds = math.log(sensors.noise_share / (1.0 - sensors.noise_share))
     return LogOddsTerms(
         other=other,
-        looks=w.object_seen - against,
-        scores=w.scores,
+        looks=w.object_seen - counted - against,
+        scores=counted,
         second_box=w.second_box,
         motion=np.where(is_noise, evidence.gained - odds, 0.0),
         rest=sides[rows, best] - np.logaddexp.reduce(sides, axis=1),

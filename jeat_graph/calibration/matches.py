@@ -13,7 +13,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.eval.frames import IGNORE_COVERED, match
+from jeat_graph.eval.matching import IGNORE_COVERED, match
 
 # A detection is of a vehicle if it overlaps its true box by at least this IoU.
 MATCH_IOU = 0.5

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from jeat_graph.cli.count_output import (
     PublicationOptions,
     clock_s,
+    rounded,
     station_columns,
     with_clock,
     write_publication,
@@ -237,8 +238,8 @@ def _show(counts: list[Count], *, shown: bool) -> None:
 
 
 def _columns(rows: list[Any], kind: type) -> dict[str, npt.NDArray[Any]]:
-    """One column an attribute; classes that are not known are left out."""
+    """One column an attribute, rounded; classes that are not known are left out."""
     names = [f.name for f in dataclasses.fields(kind)]
-    columns = {name: np.array([getattr(row, name) for row in rows]) for name in names}
+    columns = rounded({name: np.array([getattr(row, name) for row in rows]) for name in names})
     classes = columns.pop("vehicle_class")
     return columns | {"class": classes} if any(classes) else columns

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.eval.stations import StationRecord
+from jeat_graph.io.tables.rounding import round_decimals
 
 if TYPE_CHECKING:
     from jeat_graph.eval.counting import LineCrossing
@@ -25,7 +26,7 @@ _PUBLISHER = re.compile(r"[A-Za-z]{2}:\S.*")
 Columns = dict[str, npt.NDArray[Any]]
 _CROSSINGS = "crossings.csv"
 #: Columns of times (s) and of the same times on the clock.
-_CLOCKS = {"t": "time", "t_from": "begin", "t_to": "end"}
+_CLOCKS = {"t": "time", "t_from": "begin", "t_to": "end", "t_start": "begin", "t_end": "end"}
 
 
 def clock_s(begin: str | None) -> float:
@@ -61,12 +62,30 @@ def with_clock(columns: Mapping[str, npt.NDArray[Any]], begin: str | None) -> Co
     return out
 
 
+#: Decimals of columns: of times (s), of flows an hour, of shares (per cent), of speeds (km/h), of vehicles.
+_DECIMALS = {
+    **dict.fromkeys(("t", "t_from", "t_to", "headway_s", "expected"), 3),
+    **dict.fromkeys(("flow_per_hour", "speed_kmh"), 1),
+    "occupancy": 2,
+    "observed": 3,
+    "probability": 6,
+}
+
+
+def rounded(columns: Mapping[str, npt.NDArray[Any]]) -> Columns:
+    """Return columns with the decimals that mean something; those that are no measures stay as they are."""
+    return {
+        name: round_decimals(values, _DECIMALS[name]) if name in _DECIMALS else values
+        for name, values in columns.items()
+    }
+
+
 def station_columns(records: Sequence[StationRecord]) -> Columns:
-    """Return one column an attribute, and one a class (`flow_car`)."""
+    """Return one column an attribute, rounded, and one a class (`flow_car`)."""
     names = [one.name for one in fields(StationRecord) if one.name != "by_class"]
     columns = {name: np.array([getattr(record, name) for record in records]) for name in names}
     classes = list(records[0].by_class) if records else []
-    return columns | {
+    return rounded(columns) | {
         f"flow_{kind}": np.array([one.by_class[kind] for one in records], dtype=np.int64) for kind in classes
     }
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,8 @@ from jeat_graph.data.progress import with_progress
 if TYPE_CHECKING:
     from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.data.trajectories import GroundTruth
+    from jeat_graph.eval.judge import Judgement
+    from jeat_graph.eval.load import JudgedRun
     from jeat_graph.eval.tables import Table
 
 WRITES = ("json",)
@@ -36,9 +40,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "runs",
         nargs="+",
         metavar="RUN",
-        help="run directory, trajectory table or result of another tracker; the scores of several are pooled",
+        help="run directory, trajectory table or result of another tracker; the scores of several with a "
+        "truth each are pooled, those of several with one truth (trackers on one recording) have a row each",
     )
-    add("--gt", **_MANY, required=True, metavar="FILE", help="ground truth of each RUN, in the same order")
+    add(
+        "--gt",
+        **_MANY,
+        required=True,
+        metavar="FILE",
+        help="ground truth of each RUN, in the same order, or one for all of them (trackers on one "
+        "recording)",
+    )
     add(
         "--json",
         metavar="FILE",
@@ -79,68 +91,54 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--detections",
         **_MANY,
         metavar="FILE",
-        help="also print the average precision of each RUN's detections",
+        help="also print the average precision of the detections that belong to each --gt",
     )
     add(
         "--road",
         **_MANY,
         metavar="FILE",
-        help="ground truth of each RUN on the road (gt_road.csv): also print errors of its road "
-        "tables in m and km/h",
+        help="ground truth on the road that belongs to each --gt (gt_road.csv): also print errors of the "
+        "road tables in m and km/h",
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Judge, and print or write the result."""
-    from jeat_graph.eval.judge import breakdown_tables, judge_runs, rows_beyond, summary_table
-    from jeat_graph.eval.load import check_classes, load_run
-    from jeat_graph.eval.resampling import MAX_AGE_S
+    from jeat_graph.eval.judge import summary_of_runs, summary_table
     from jeat_graph.eval.tables import to_json
-    from jeat_graph.runs.beside import rate_of_truth
 
-    if len(args.runs) != len(args.gt):
-        raise DataError(f"{len(args.runs)} RUN and {len(args.gt)} --gt given; give one truth for each run")
+    names = _names(args.runs, args.gt)
     with stages("eval", 2 + args.breakdown + bool(args.detections)) as stage:
         stage("reading")
-        runs = []
-        for path, truth in with_progress(list(zip(args.runs, args.gt, strict=True))):
-            how: ReadingOptions = {**tables_read(args), "time_unit": args.time_unit}
-            how["rate_hz"] = rate_of_truth(path, truth, args.rate)
-            runs.append(load_run(path, truth, classes=args.classes, **how))
-        if args.classes is not None:
-            check_classes([one.truth for one in runs], args.classes)
+        runs = _read(args)
         stage("judging")
-        max_age_s = MAX_AGE_S if args.max_age is None else args.max_age
-        judged = judge_runs(
-            runs,
-            iou=args.iou,
-            max_age_s=max_age_s,
-            max_gap_s=args.max_gap,
-            outside=args.outside == "false",
-        )
-        result: dict[str, object] = {kind: one.as_dict() for kind, one in judged.items()}
-        tables = [summary_table(judged)]
+        # With one truth the runs are trackers on one recording: each is judged by itself.
+        apart = len(names) > 1
+        groups = {name: [run] for name, run in zip(names, runs, strict=True)} if apart else {names[0]: runs}
+        judged = {name: _judge(args, group) for name, group in groups.items()}
+        tables = [summary_of_runs(judged) if apart else summary_table(judged[names[0]])]
+        scores: dict[str, dict[str, object]] = {
+            name: {kind: one.as_dict() for kind, one in kinds.items()} for name, kinds in judged.items()
+        }
         if args.breakdown:
             stage("breakdown")
-            extra = breakdown_tables(judged, iou=args.iou)
-            tables += extra
-            result["breakdown"] = [
-                dict(zip(table.columns, row, strict=True)) for table in extra for row in table.rows
-            ]
+            for name, kinds in judged.items():
+                extra = _breakdown(args, kinds)
+                tables += [replace(one, title=f"{name}: {one.title}") for one in extra] if apart else extra
+                scores[name]["breakdown"] = [
+                    dict(zip(table.columns, row, strict=True)) for table in extra for row in table.rows
+                ]
+        result: dict[str, object] = {"runs": scores} if apart else scores[names[0]]
         if args.road:
             table, result["road"] = _on_the_road(args)
             tables.append(table)
         if args.detections:
             stage("detections")
-            table, values = _detections(args, [one.truth for one in runs])
+            table, values = _detections(args, [one.truth for one in runs][: len(args.gt)])
             tables.append(table)
             result["detections"] = values
-    for line in rows_beyond(judged, [one.name for one in runs]):
-        say("eval", f"{line} (--outside ignored leaves them out)")
-    behind = {kind: sum(getattr(one, kind) is not None for one in runs) for kind in judged}
-    if len(set(behind.values())) > 1:
-        counts = ", ".join(f"{kind} {count}" for kind, count in behind.items())
-        say("eval", f"the rows pool different RUNs, so compare them with care: {counts}")
+    for name, group in groups.items():
+        _say_caveats(judged[name], group)
     if args.json is not None:
         _write(args.json, to_json(result))
     if args.json != "-":
@@ -150,16 +148,86 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _names(runs: Sequence[str], truths: Sequence[str]) -> list[str]:
+    """Return what the rows of the table are called: each run, if one truth is that of several, else one name.
+
+    The last part of each path, or the whole paths where two end alike.
+
+    Raises:
+        DataError: neither one truth nor one for each run, or a run twice that is to have a row of its own.
+    """
+    if len(runs) == len(truths):
+        return ["pooled"]
+    if len(truths) != 1:
+        raise DataError(
+            f"{len(runs)} RUN and {len(truths)} --gt given; "
+            "give one truth for each run, or one for all of them"
+        )
+    twice = [run for k, run in enumerate(runs) if run in runs[:k]]
+    if twice:
+        raise DataError("this RUN is given twice", twice[0])
+    short = [Path(run).name or run for run in runs]
+    return short if len(set(short)) == len(short) else list(runs)
+
+
+def _read(args: argparse.Namespace) -> list[JudgedRun]:
+    """Read each run with its truth, or with the one of all."""
+    from jeat_graph.eval.load import check_classes, load_run
+    from jeat_graph.runs.beside import rate_of_truth
+
+    truths = args.gt * len(args.runs) if len(args.gt) == 1 else args.gt
+    runs = []
+    for path, truth in with_progress(list(zip(args.runs, truths, strict=True))):
+        how: ReadingOptions = {**tables_read(args), "time_unit": args.time_unit}
+        how["rate_hz"] = rate_of_truth(path, truth, args.rate)
+        runs.append(load_run(path, truth, classes=args.classes, **how))
+    if args.classes is not None:
+        check_classes([one.truth for one in runs], args.classes)
+    return runs
+
+
+def _judge(args: argparse.Namespace, runs: Sequence[JudgedRun]) -> dict[str, Judgement]:
+    from jeat_graph.eval.judge import judge_runs
+    from jeat_graph.eval.resampling import MAX_AGE_S
+
+    return judge_runs(
+        runs,
+        iou=args.iou,
+        max_age_s=MAX_AGE_S if args.max_age is None else args.max_age,
+        max_gap_s=args.max_gap,
+        outside=args.outside == "false",
+    )
+
+
+def _breakdown(args: argparse.Namespace, judged: dict[str, Judgement]) -> list[Table]:
+    from jeat_graph.eval.judge import breakdown_tables
+
+    return breakdown_tables(judged, iou=args.iou)
+
+
+def _say_caveats(judged: dict[str, Judgement], runs: Sequence[JudgedRun]) -> None:
+    """Say which rows count as false by their times alone, and which kinds of tables some runs lack."""
+    from jeat_graph.eval.judge import rows_beyond
+
+    for line in rows_beyond(judged, [one.name for one in runs]):
+        say("eval", f"{line} (--outside ignored leaves them out)")
+    behind = {kind: sum(getattr(one, kind) is not None for one in runs) for kind in judged}
+    if len(set(behind.values())) > 1:
+        counts = ", ".join(f"{kind} {count}" for kind, count in behind.items())
+        say("eval", f"the rows pool different RUNs, so compare them with care: {counts}")
+
+
 def _on_the_road(args: argparse.Namespace) -> tuple[Table, dict[str, dict[str, float | int]]]:
     """Scores of the tables of the road, by table and, of several runs, by run."""
     from jeat_graph.eval.road import judge_road_run
     from jeat_graph.eval.tables import Cell, Table
 
-    if len(args.road) != len(args.runs):
-        raise DataError(f"{len(args.runs)} RUN and {len(args.road)} --road given; give one for each")
+    if len(args.road) != len(args.gt):
+        raise DataError(f"{len(args.gt)} --gt and {len(args.road)} --road given; give one for each")
+    truths = args.road * len(args.runs) if len(args.road) == 1 else args.road
     values = {
         kind if len(args.runs) == 1 else f"{run} {kind}": scores
-        for run, truth in zip(args.runs, args.road, strict=True)
+        for run, truth in zip(args.runs, truths, strict=True)
         for kind, scores in judge_road_run(run, truth).items()
     }
     records: list[dict[str, Cell]] = [{"table": kind, **scores} for kind, scores in values.items()]
@@ -174,7 +242,9 @@ def _detections(
     from jeat_graph.io.tables.detections_io import read_many
 
     if len(args.detections) != len(truths):
-        raise DataError(f"{len(truths)} RUN and {len(args.detections)} --detections given; give one for each")
+        raise DataError(
+            f"{len(truths)} --gt and {len(args.detections)} --detections given; give one for each"
+        )
     how: ReadingOptions = {**truth_read(args), "time_unit": args.time_unit}
     detections = [read_many([path], **how) for path in args.detections]
     found = detection_ap(list(zip(truths, detections, strict=True)))

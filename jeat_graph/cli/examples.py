@@ -25,7 +25,7 @@ EXAMPLES = {
     "stream": "jeat-graph stream --format csv < scans.jsonl > tracks.csv",
     "serve": "jeat-graph serve --check gantry7.yaml",
     "batch": "jeat-graph batch manifest.csv --out week",
-    "eval": "jeat-graph eval run --gt gt.csv",
+    "eval": "jeat-graph eval run bytetrack.txt --gt gt.csv",
     "compare": "jeat-graph compare run --gt gt.csv --out comparison",
     "count": "jeat-graph count run --line north=200,500,900,520 --interval 900 --out counts.csv",
     "explain": "jeat-graph explain run --track 7",

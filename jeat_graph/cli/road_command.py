@@ -6,11 +6,13 @@ import argparse
 import math
 import sys
 from collections import Counter
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.cli.options import add_frames, frames_read
+from jeat_graph.cli.count_output import clock_s, with_clock
+from jeat_graph.cli.options import add_counting, frames_read
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import DataError
@@ -55,8 +57,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="spline",
         help="solver that fits the boxes: the compiled one, or a factor graph in GTSAM (spline)",
     )
-    add_frames(parser)
+    add_counting(parser)
     add("--interval", type=positive, metavar="S", help="length of an interval of counts.csv (300)")
+    add(
+        "--begin",
+        metavar="DATE",
+        help="date and time of the recording's time 0, say --begin 2026-11-27T07:30:00: counts, crossings "
+        "and headways are of that clock",
+    )
     add(
         "--out",
         required=True,
@@ -69,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     """Fit the vehicles and write the tables."""
     from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.io.files.outputs import check_folder
-    from jeat_graph.io.tables.table_writer import write_columns
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
     from jeat_graph.road.box_rows import BoxConfig
     from jeat_graph.road.boxes_road import BOX_MOTION, follow_boxes
     from jeat_graph.road.camera_file import read_camera
@@ -77,13 +85,15 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.inputs import RoadMarks, read_marks
     from jeat_graph.road.lanes import LaneConfig
     from jeat_graph.road.motion_fit import MotionFitConfig
+    from jeat_graph.road.picture_crossings import agreement_notes, with_unplaced
     from jeat_graph.road.points_road import follow_points, summarise
-    from jeat_graph.road.results import write_result
-    from jeat_graph.road.road_page import write_road_page
+    from jeat_graph.road.results import with_own_classes
     from jeat_graph.road.sources import boxes_of, contact_pixels, only_points, recording_span_of, run_table
     from jeat_graph.road.speeds import ContactConfig
-    from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
+    from jeat_graph.road.traffic import SummaryConfig
+    from jeat_graph.road.writing import write_road
 
+    later_s = clock_s(args.begin)
     out = Path(args.out)
     check_folder(out)
     camera = read_camera(args.camera)
@@ -92,7 +102,11 @@ def run(args: argparse.Namespace) -> int:
     if args.contact_height is not None:
         contact = ContactConfig(height_m=args.contact_height[0], height_sd_m=args.contact_height[1])
     table = run_table(args.source)
-    how: ReadingOptions = {**frames_read(args), "image": (camera.width, camera.height)}
+    how: ReadingOptions = {
+        **frames_read(args),
+        "class_names": args.class_names,
+        "image": (camera.width, camera.height),
+    }
     if args.contact == "cuboid" or (args.contact is None and not only_points(table)):
         if only_points(table):
             raise DataError("has points only, no boxes: --contact cuboid needs boxes, use center", table)
@@ -114,12 +128,18 @@ def run(args: argparse.Namespace) -> int:
             )
     span_s = recording_span_of(args.source, **how)
     result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, span_s, left_out)
-    write_result(result, out)
-    traffic = SummaryConfig() if args.interval is None else SummaryConfig(interval_s=args.interval)
-    write_columns(count_columns(result, traffic), out / "counts.csv")
-    write_columns(headway_columns(result, traffic), out / "headways.csv")
-    write_road_page(result, camera, traffic, Path(args.source).name or str(args.source), out / "road.html")
-    for text in _notes(result):
+    notes: list[str] = []
+    if not only_points(table):
+        boxes = read_trajectories(table, **how)
+        result = with_own_classes(result, boxes.final_classes())
+        result, agreements = with_unplaced(result, boxes, marks.lines)
+        notes = agreement_notes(agreements)
+    traffic = SummaryConfig(begin_s=later_s)
+    if args.interval is not None:
+        traffic = replace(traffic, interval_s=args.interval)
+    name = Path(args.source).name or str(args.source)
+    write_road(result, camera, traffic, name, out, partial(with_clock, begin=args.begin))
+    for text in [*_notes(result), *notes]:
         say("road", text)
     lanes, crossings = len(result.lanes.names), len(result.crossings)
     print(f"{len(vehicles)} vehicles, {lanes} lanes, {crossings} crossings: {out}")
@@ -130,7 +150,7 @@ def _notes(result: RoadResult) -> list[str]:
     """Return what is not told, and why."""
     notes = [
         f"{count} tracks are left out, {reason} (left_out.csv)"
-        for reason, count in Counter(one.reason for one in result.left_out).items()
+        for reason, count in Counter(one.reason for one in result.left_out if not one.line).items()
     ]
     if result.vehicles and not result.lanes.names:
         notes.append("no lanes: the vehicles show none")

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.detection.before_tracking import DetectedFile
     from jeat_graph.detection.request import DetectRequest
+    from jeat_graph.road.camera import RoadCamera
 
 HELP = (
     "track vehicles in files of detections, or in raw frames and events, and write a run "
@@ -75,8 +76,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--camera",
         metavar="CAMERA.yaml",
-        help="a calibrated camera over the road: also write road_causal.csv and road_smoothed.csv (m, "
-        "km/h), and the tables of --diagnostics",
+        help="a calibrated camera over the road, which also says the picture's size: write road_causal.csv "
+        "and road_smoothed.csv (m, km/h) too, and the tables of --diagnostics",
     )
     raw = parser.add_argument_group(
         "raw recordings",
@@ -103,9 +104,11 @@ def run(args: argparse.Namespace) -> int:
     if args.detections and args.frame_times is not None:
         raise DataError("--frame-times is of frames to detect in; DETECTIONS have their own times")
     from jeat_graph.io.files.addresses import is_live
+    from jeat_graph.road.camera_file import read_camera
     from jeat_graph.runs.run_options import RunOptions
     from jeat_graph.runs.track_files import TrackRequest, track_files
 
+    camera = None if args.camera is None else read_camera(args.camera)
     detections = tuple(str(item) for item in args.detections)
     detectors: tuple[str, ...] = ()
     if detections:
@@ -116,6 +119,8 @@ def run(args: argparse.Namespace) -> int:
         if args.frames is not None and is_live(args.frames):
             args.frames = None  # there is nothing more to be learnt of it
         args.classes = None  # the networks have looked for no others
+    if camera is not None:
+        _take_picture_of(camera, args)
     request = TrackRequest(
         detections=detections,
         out=args.out,
@@ -138,7 +143,7 @@ def run(args: argparse.Namespace) -> int:
             frame_rate_hz=args.output_rate if args.output_rate is not None else args.rate,
             progress=sys.stderr.isatty(),
             diagnostics=args.diagnostics or args.camera is not None,
-            after=None if args.camera is None else _road_tables(args.camera),
+            after=None if camera is None else _road_tables(camera),
             resume=args.resume,
         ),
     )
@@ -211,12 +216,25 @@ def _check_image(image: tuple[int, int], frames: str) -> None:
         raise DataError(f"has {width} x {height} px, not the {image[0]} x {image[1]} of --image", frames)
 
 
-def _road_tables(camera_file: str) -> Callable[[Path, Config], None]:
-    """Read the camera now, for a wrong file should be known before the tracking."""
-    from jeat_graph.road.camera_file import read_camera
+def _take_picture_of(camera: RoadCamera, args: argparse.Namespace) -> None:
+    """Take the picture's size from the camera's file where nothing else says it.
 
-    camera = read_camera(camera_file)
+    Raises:
+        DataError: the picture is said to have another size, so that the camera is not that of its boxes.
+    """
+    from jeat_graph.config.reading import load_config
 
+    config = load_config(args.config, overrides(args), args.rig)
+    size = camera.width, camera.height
+    if config.input.picture != "given":
+        _say(f"picture of {size[0]} x {size[1]} px, as {args.camera} says")
+        args.image = size
+    elif size != (config.image.width, config.image.height):
+        said = f"{config.image.width:g} x {config.image.height:g}"
+        raise DataError(f"is of a picture of {size[0]} x {size[1]} px, not of {said}", args.camera)
+
+
+def _road_tables(camera: RoadCamera) -> Callable[[Path, Config], None]:
     def write(folder: Path, config: Config) -> None:
         from jeat_graph.road.run_tables import write_run_tables
 

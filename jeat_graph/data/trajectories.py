@@ -30,8 +30,10 @@ class Trajectories(TrajectoryViews):
         existence: (N,) probability that the track is a vehicle.
         mean: (N, 6) x, y, vx, vy, ax, ay of the box centre (px, px/s, px/s²), not clipped.
         var: (N, 6) variances of `mean`.
-        used: (N,) bit k is set where a detection of `sensors[k]` was used at `t`.
-        sensors: names of the sensors, at most 63.
+        used: (N,) bit k is set where a detection of `sensors[k]` was used at `t`; 0 where the track coasts:
+            `take(used > 0)` has the rows that a detector saw.
+        sensors: names of the sensors of the whole table, at most 63; this is no column. `sensor_text()` has
+            the names row by row.
         classes: (N,) class that most of the track's detections so far name, weighed by their scores; empty
             text where none names any. None where no detection of the recording has a class.
         class_probability: (N,) share of those scores that speak for it, NaN where it is unknown; or None.

@@ -79,10 +79,10 @@ class SensorHealth:
         """
         fresh = sorted(config.sensors.keys() - self._config.sensors.keys())
         self._config = config
-        rates = {name: config.sensors[name].rate_hz for name in fresh}
         return [
-            f"sensor {name!r} is not declared: taken for a detector at {hz:g} Hz"
-            for name, hz in rates.items()
+            f"sensor {name!r} is not declared: taken for a detector; without a scan for "
+            f"{self._patience_s(name):g} s it counts as silent"
+            for name in fresh
         ]
 
     def saw(self, scans: Iterable[Scan], now: float) -> list[HealthChange]:

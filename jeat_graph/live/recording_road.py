@@ -75,7 +75,7 @@ def _origin(run: Path, camera_file: str) -> dict[str, str]:
 
 
 def _write_road(run: Path, camera_file: str) -> int:
-    from jeat_graph.io.tables.table_writer import write_columns
+    from jeat_graph.io.tables.trajectories_io import read_trajectories
     from jeat_graph.road.box_rows import BoxConfig
     from jeat_graph.road.boxes_road import follow_boxes
     from jeat_graph.road.camera_file import read_camera
@@ -83,21 +83,19 @@ def _write_road(run: Path, camera_file: str) -> int:
     from jeat_graph.road.inputs import RoadMarks
     from jeat_graph.road.lanes import LaneConfig
     from jeat_graph.road.points_road import summarise
-    from jeat_graph.road.results import write_result
-    from jeat_graph.road.road_page import write_road_page
-    from jeat_graph.road.sources import boxes_of, recording_span_of
+    from jeat_graph.road.results import with_own_classes
+    from jeat_graph.road.sources import boxes_of, recording_span_of, run_table
     from jeat_graph.road.speeds import ContactConfig
-    from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns
+    from jeat_graph.road.traffic import SummaryConfig
+    from jeat_graph.road.writing import write_road
 
-    camera, out, traffic = read_camera(camera_file), run / ROAD, SummaryConfig()
+    camera = read_camera(camera_file)
     sized, left_out = follow_boxes(boxes_of(run, camera, BoxConfig()), camera, CuboidConfig())
     vehicles = [one.vehicle for one in sized]
     marks = RoadMarks({}, {})
     contact = ContactConfig(0.0, 0.0, 0.0)
     span_s = recording_span_of(run)
     result = summarise(vehicles, camera, marks, contact, LaneConfig(), sized, span_s, left_out)
-    write_result(result, out)
-    write_columns(count_columns(result, traffic), out / "counts.csv")
-    write_columns(headway_columns(result, traffic), out / "headways.csv")
-    write_road_page(result, camera, traffic, run.name, out / "road.html")
+    result = with_own_classes(result, read_trajectories(run_table(run)).final_classes())
+    write_road(result, camera, SummaryConfig(), run.name, run / ROAD)
     return len(vehicles)

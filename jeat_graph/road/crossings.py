@@ -12,6 +12,8 @@ from jeat_graph.road.speeds import Speed, Vehicle
 
 _SAMPLES = 65
 _REFINEMENTS = 40
+#: For how long (s) a fit is followed beyond its boxes: no longer than a jerk of `MotionFitConfig` lasts.
+_BEYOND_S = 1.0
 
 
 class Crossing(NamedTuple):
@@ -22,12 +24,14 @@ class Crossing(NamedTuple):
         x: where across the road (m).
         y: where along it (m).
         speed: how fast it is then.
+        direction: to which side it crosses, `left` or `right` as `count` has them (`eval.counting.Line`).
     """
 
     t: float
     x: float
     y: float
     speed: Speed
+    direction: str
 
 
 def road_line(
@@ -39,18 +43,46 @@ def road_line(
 
 
 def crossing(vehicle: Vehicle, ends: FloatArray) -> Crossing | None:
-    """First crossing of the line through `ends` (2, 2) while the fit believes the track, or None."""
+    """First crossing of the line through `ends` (2, 2) while the fit holds for the track, or None.
+
+    Boxes that the picture cuts off are not fitted, but their track goes on: a vehicle that drives out at the
+    side of the picture crosses a line there too. So what is crossed nowhere in the time that the fit
+    believes is looked for shortly before and after it (`followed_span`).
+    """
     start, end = vehicle.fit.window()
+    begin, stop = followed_span(vehicle)
+    for span in ((start, end), (begin, start), (end, stop)):
+        found = _crossing_within(vehicle, ends, *span) if span[1] > span[0] else None
+        if found is not None:
+            return found
+    return None
+
+
+def followed_span(vehicle: Vehicle) -> tuple[float, float]:
+    """First and last time (s) at which a vehicle's place is told: up to `_BEYOND_S` beyond its fit.
+
+    The track has to be there, and the fit has to believe it to that end: what wanders off is not followed.
+    """
+    start, end = vehicle.fit.window()
+    first, last = (float(vehicle.fit.t[k]) for k in (0, -1))
+    begin, stop = (float(vehicle.t[k]) for k in (0, -1))
+    return (
+        max(begin, start - _BEYOND_S) if start <= first else start,
+        min(stop, end + _BEYOND_S) if end >= last else end,
+    )
+
+
+def _crossing_within(vehicle: Vehicle, ends: FloatArray, start: float, end: float) -> Crossing | None:
     along = ends[1] - ends[0]
-    normal = np.array([-along[1], along[0]])
+    left = np.array([-along[1], along[0]])  # x is to the right and y ahead: as a map is looked at
     t = np.linspace(start, end, _SAMPLES)
-    side = (vehicle.fit.at(t) - ends[0]) @ normal
+    side = (vehicle.fit.at(t) - ends[0]) @ left
     change = np.flatnonzero(np.signbit(side[:-1]) != np.signbit(side[1:]))
     for k in change:
         low, high = float(t[k]), float(t[k + 1])
         for _ in range(_REFINEMENTS):
             middle = (low + high) / 2.0
-            here = float((vehicle.fit.at(np.array(middle)) - ends[0]) @ normal)
+            here = float((vehicle.fit.at(np.array(middle)) - ends[0]) @ left)
             if np.signbit(here) == np.signbit(side[k]):
                 low = middle
             else:
@@ -59,5 +91,6 @@ def crossing(vehicle: Vehicle, ends: FloatArray) -> Crossing | None:
         place = vehicle.fit.at(np.array(at))
         share = float((place - ends[0]) @ along / (along @ along))
         if 0.0 <= share <= 1.0:
-            return Crossing(at, float(place[0]), float(place[1]), vehicle.speed_at(at))
+            way = "left" if np.signbit(side[k]) else "right"
+            return Crossing(at, float(place[0]), float(place[1]), vehicle.speed_at(at), way)
     return None

@@ -41,6 +41,10 @@ class RoadMotion(Protocol):
     def covariance(self) -> FloatArray:
         """Their covariance (2 C, 2 C) by noise, those across first."""
 
+    @property
+    def t(self) -> FloatArray:
+        """Times (N,) of what was fitted, ascending (s)."""
+
     def window(self) -> tuple[float, float]:
         """First and last time that the fit believes (s)."""
 

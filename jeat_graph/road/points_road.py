@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.road.boxes_road import SizedVehicle
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.crossings import crossing, road_line
 from jeat_graph.road.inputs import PointTable, RoadMarks
@@ -15,6 +15,9 @@ from jeat_graph.road.lanes import LaneConfig, find_lanes, given_lanes
 from jeat_graph.road.motion_fit import MotionFitConfig
 from jeat_graph.road.results import NO_SIZE, TOO_LITTLE, LeftOut, RoadResult
 from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle, told
+
+if TYPE_CHECKING:
+    from jeat_graph.road.boxes_road import SizedVehicle
 
 
 def follow_points(

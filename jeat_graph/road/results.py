@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,18 +34,21 @@ class Size(NamedTuple):
 
 
 class LeftOut(NamedTuple):
-    """A track that is no vehicle on the road.
+    """A track that is no vehicle on the road, or a crossing in the picture that is none there.
 
     Attributes:
         track_id: its identity.
         t_first, t_last: its first and last time (s).
         reason: why.
+        line: of a crossing, name of the line, and both times are its time in the picture; empty where the
+            whole track is left out.
     """
 
     track_id: int
     t_first: float
     t_last: float
     reason: str
+    line: str = ""
 
 
 #: Reason of a track of which too little can be placed.
@@ -60,7 +63,8 @@ class RoadResult:
     Attributes:
         vehicles: the vehicles.
         sizes: their sizes, in the same order.
-        classes: their classes by length, empty where nothing tells.
+        classes: their classes: the tracks' own (`with_own_classes`), else by length; empty where nothing
+            tells.
         parked: which of them stood all the time.
         speeds: their mean speeds; NaN where they are not known.
         lane_names: the lanes that they were in most.
@@ -68,7 +72,7 @@ class RoadResult:
         crossings: line, place of the vehicle in `vehicles`, and the crossing.
         lines: names of all lines, those too that nobody crosses.
         span_s: begin and end of the recording (s); None where only the crossings tell.
-        left_out: the tracks that are no vehicles on the road.
+        left_out: the tracks that are no vehicles on the road, and crossings that could not be placed.
     """
 
     vehicles: Sequence[Vehicle]
@@ -82,6 +86,18 @@ class RoadResult:
     lines: Sequence[str] = ()
     span_s: tuple[float, float] | None = None
     left_out: Sequence[LeftOut] = ()
+
+
+def with_own_classes(result: RoadResult, own: Mapping[int, str]) -> RoadResult:
+    """Give vehicles the classes of their tracks, if any track has one; else they keep those by length.
+
+    Args:
+        result: what was found out about the vehicles.
+        own: class by identity, empty where it is unknown.
+    """
+    if not any(own.values()):
+        return result
+    return replace(result, classes=[own.get(vehicle.track_id, "") for vehicle in result.vehicles])
 
 
 def road_columns(vehicle: Vehicle, size: Size) -> dict[str, npt.NDArray[Any]]:
@@ -182,21 +198,23 @@ def crossing_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
     for name, field in (("speed_kmh", "kmh"), ("low_kmh", "low_kmh"), ("high_kmh", "high_kmh")):
         values = np.array([getattr(row[2].speed, field) for row in rows], dtype=np.float64)
         columns[name] = round_decimals(values, _DECIMALS)
+    columns["direction"] = np.array([row[2].direction for row in rows], dtype=np.str_)
     return columns
 
 
 def left_out_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
-    """Rows of `left_out.csv`, one a track that is no vehicle on the road."""
+    """Rows of `left_out.csv`, one a track that is no vehicle on the road, or a crossing not placed."""
     return {
         "track_id": np.array([one.track_id for one in result.left_out], dtype=np.int64),
         "t_first": np.array([one.t_first for one in result.left_out], dtype=np.float64),
         "t_last": np.array([one.t_last for one in result.left_out], dtype=np.float64),
         "reason": np.array([one.reason for one in result.left_out], dtype=np.str_),
+        "line": np.array([one.line for one in result.left_out], dtype=np.str_),
     }
 
 
 def write_result(result: RoadResult, folder: str | Path) -> None:
-    """Write the tables of vehicles, crossings and tracks left out, each whole or not at all."""
+    """Write the tables of vehicles and of what is left out, each whole or not at all."""
     from jeat_graph.io.tables.table_writer import TableWriter, write_columns
 
     with TableWriter(Path(folder) / "road.csv") as writer:
@@ -205,7 +223,6 @@ def write_result(result: RoadResult, folder: str | Path) -> None:
         for vehicle, size in zip(result.vehicles, result.sizes, strict=True):
             writer.append(road_columns(vehicle, size))
     write_columns(speed_columns(result), Path(folder) / "speeds.csv")
-    write_columns(crossing_columns(result), Path(folder) / "crossings.csv")
     write_columns(left_out_columns(result), Path(folder) / "left_out.csv")
 
 

@@ -132,7 +132,8 @@ def _counts(result: RoadResult, config: SummaryConfig) -> str:
     if not busy.any():
         return ""
     columns = {name: values[busy] for name, values in columns.items()}
-    shown = ("line", "t_start", "lane", "class", "count", "per_hour", "mean_kmh", "p85_kmh")
+    columns["t_start"] = columns["t_start"] - config.begin_s
+    shown = ("line", "t_start", "direction", "lane", "class", "count", "per_hour", "mean_kmh", "p85_kmh")
     digits = {"t_start": 0, "per_hour": 0, "mean_kmh": 1, "p85_kmh": 1}
     table = _table({name: columns[name] for name in shown}, "Counts at each line", digits)
     return f"<h2>Counts</h2>{table}"

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.config.fields import check, number
+from jeat_graph.config.fields import LARGEST, check, number
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.eval.counting import interval_edges
+from jeat_graph.eval.counting import interval_edges, observed_s
 from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.results import RoadResult
@@ -28,6 +28,7 @@ class SummaryConfig:
 
     interval_s: float = number(300.0, "s", "length of an interval of the counts", open_low=True)
     longest_headway_s: float = number(60.0, "s", "two vehicles farther apart do not follow one another")
+    begin_s: float = number(0.0, "s", "the clock's time of the recording's time 0", -LARGEST)
     draws: int = number(400, "draws", "of the errors, for the interval of the 85th percentile", 20)
 
     def __post_init__(self) -> None:
@@ -59,63 +60,101 @@ def passages(result: RoadResult) -> list[Passage]:
     return [Passage(row[0], lane, row[1], row[2]) for row, lane in zip(rows, lanes, strict=True)]
 
 
-def count_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.NDArray[Any]]:
-    """Rows of `counts.csv`: line, lane (or all) and class (or all) in each interval of the recording.
+class Group(NamedTuple):
+    """What a row of `counts.csv` counts: `all`, or one of each; a lane or class is empty where it is unknown.
 
-    Every combination of line, lane and class that occurs has a row in every interval, also where nobody came
-    by; so has every line, with all lanes and classes. The intervals are those of `jeat-graph count`.
+    Attributes:
+        line: name of the line.
+        direction: `left` or `right`.
+        lane: name of the lane.
+        kind: class.
+    """
+
+    line: str
+    direction: str
+    lane: str
+    kind: str
+
+
+def count_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.NDArray[Any]]:
+    """Rows of `counts.csv`: line, direction, lane and class (or all of them) in each interval.
+
+    Every combination that occurs has a row in every interval of the recording, also where nobody came by; so
+    has every line, with all directions, lanes and classes. Rows of one direction, lane or class add up to
+    that of all: vehicles in no lane or of no class have rows of their own, with an empty lane or class. The
+    intervals are those of `jeat-graph count`. Vehicles an hour are of the time that the recording covers, of
+    which `observed` (per cent) is the share; NaN where it covers none.
 
     The intervals of the speeds are for the vehicles that were there: by noise of each and by the calibration,
     which is wrong for all of them alike.
     """
-    groups: dict[tuple[str, str, str], dict[int, list[Passage]]]
-    groups = {(line, ALL, ALL): {} for line in result.lines}
     found = passages(result)
+    groups: dict[Group, dict[int, list[Passage]]] = {Group(line, ALL, ALL, ALL): {} for line in result.lines}
+    lanes = any(one.lane for one in found)
+    kinds = any(result.classes[one.vehicle] for one in found)
     for one in found:
-        k = math.floor(one.crossing.t / config.interval_s)
-        kind = result.classes[one.vehicle]
-        for lane in dict.fromkeys((ALL, one.lane or ALL)):
-            for name in dict.fromkeys((ALL, kind or ALL)):
-                groups.setdefault((one.line, lane, name), {}).setdefault(k, []).append(one)
-    times = [one.crossing.t for one in found]
-    span = result.span_s if result.span_s is not None or not times else (min(times), max(times))
+        k = math.floor((one.crossing.t + config.begin_s) / config.interval_s)
+        ways = (ALL, one.crossing.direction)
+        of_lane = (ALL, one.lane) if lanes else (ALL,)
+        of_kind = (ALL, result.classes[one.vehicle]) if kinds else (ALL,)
+        for way, lane, kind in product(ways, of_lane, of_kind):
+            groups.setdefault(Group(one.line, way, lane, kind), {}).setdefault(k, []).append(one)
+    times = [one.crossing.t + config.begin_s for one in found]
+    span = _span(result, config, times)
     edges = [] if span is None else interval_edges(*span, config.interval_s, times).tolist()
-    order = sorted(groups, key=lambda key: (key[0], key[1] != ALL, key[1], key[2] != ALL, key[2]))
+    order = sorted(groups, key=lambda group: (group.line, *(_all_first(name) for name in group[1:])))
     rows = [
-        _count_row(key, k, groups[key].get(k, []), config)
-        for _, keys in groupby(order, key=lambda key: key[0])
-        for k, key in product((round(edge / config.interval_s) for edge in edges[:-1]), list(keys))
+        _count_row(group, k, groups[group].get(k, []), None if result.span_s is None else span, config)
+        for _, own in groupby(order, key=lambda group: group.line)
+        for k, group in product((round(edge / config.interval_s) for edge in edges[:-1]), list(own))
     ]
-    text = ("line", "lane", "class")
-    names = ("t_start", "t_end", "count", "per_hour", *_SPEEDS)
-    return {
-        **{name: np.array([row[name] for row in rows], dtype=np.str_) for name in text},
-        **{
-            name: np.array([row[name] for row in rows], dtype=np.int64)
-            if name == "count"
-            else round_decimals(np.array([row[name] for row in rows], dtype=np.float64), 3)
-            for name in names
-        },
+    text = ("line", "direction", "lane", "class")
+    decimals = {"t_start": 3, "t_end": 3, "observed": 3, "per_hour": 1} | dict.fromkeys(_SPEEDS, 3)
+    columns: dict[str, npt.NDArray[Any]] = {
+        name: np.array([row[name] for row in rows], dtype=np.str_) for name in text
     }
+    for name in ("t_start", "t_end", "observed", "count", "per_hour", *_SPEEDS):
+        values = np.array([row[name] for row in rows], dtype=np.int64 if name == "count" else np.float64)
+        columns[name] = values if name == "count" else round_decimals(values, decimals[name])
+    return columns
 
 
 _SPEEDS = ("mean_kmh", "mean_low_kmh", "mean_high_kmh", "p85_kmh", "p85_low_kmh", "p85_high_kmh")
 
 
+def _all_first(name: str) -> tuple[bool, bool, str]:
+    """Order `all` before the names, and what is unknown after them."""
+    return name != ALL, not name, name
+
+
+def _span(result: RoadResult, config: SummaryConfig, times: Sequence[float]) -> tuple[float, float] | None:
+    """Begin and end on the clock (s) of the recording, or of its crossings; None without either."""
+    if result.span_s is not None:
+        return result.span_s[0] + config.begin_s, result.span_s[1] + config.begin_s
+    return (min(times), max(times)) if times else None
+
+
 def _count_row(
-    key: tuple[str, str, str], k: int, group: Sequence[Passage], config: SummaryConfig
+    group: Group,
+    k: int,
+    found: Sequence[Passage],
+    span: tuple[float, float] | None,
+    config: SummaryConfig,
 ) -> dict[str, Any]:
-    line, lane, kind = key
-    start = k * config.interval_s
+    """Make a row; where the recording's span is not known, all of the interval counts as observed."""
+    start, end = k * config.interval_s, (k + 1) * config.interval_s
+    seen = config.interval_s if span is None else observed_s(start, end, span)
     return {
-        "line": line,
-        "lane": lane,
-        "class": kind,
+        "line": group.line,
+        "direction": group.direction,
+        "lane": group.lane,
+        "class": group.kind,
         "t_start": start,
-        "t_end": start + config.interval_s,
-        "count": len(group),
-        "per_hour": 3600.0 * len(group) / config.interval_s,
-        **dict(zip(_SPEEDS, speed_summary([one.crossing.speed for one in group], config), strict=True)),
+        "t_end": end,
+        "observed": 100.0 * seen / config.interval_s,
+        "count": len(found),
+        "per_hour": 3600.0 * len(found) / seen if seen else math.nan,
+        **dict(zip(_SPEEDS, speed_summary([one.crossing.speed for one in found], config), strict=True)),
     }
 
 
@@ -147,8 +186,8 @@ def speed_summary(speeds: Sequence[Any], config: SummaryConfig) -> tuple[float, 
 def headway_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.NDArray[Any]]:
     """Rows of `headways.csv`: each vehicle that follows another over a line in its lane.
 
-    Headways are from front to front where sizes are known, else from point to point; gaps, from the rear of
-    the one ahead to the front, need sizes.
+    Their times `t` are of the clock. Headways are from front to front where sizes are known, else from point
+    to point; gaps, from the rear of the one ahead to the front, need sizes.
     """
     by_lane: dict[tuple[str, str], list[Passage]] = {}
     for one in passages(result):
@@ -159,7 +198,7 @@ def headway_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.
         for ahead, behind in pairwise(group):
             row = _headway(result, ahead, behind)
             if row["headway_s"] <= config.longest_headway_s:
-                rows.append({"line": line, "lane": lane, **row})
+                rows.append({"line": line, "lane": lane, **row, "t": row["t"] + config.begin_s})
     names = [f"{kind}{end}" for kind in ("headway_s", "gap_s", "gap_m") for end in ("", "_low", "_high")]
     ids = ("track_id", "ahead_id")
 

@@ -102,9 +102,12 @@ def _declare_sensors(config: Config, recordings: Sequence[Detections]) -> tuple[
         if rate is not None and (known is None or other):
             sensor = replace(sensor, rate_hz=rate)
         if known is None:
-            notes.append(f"sensor {name!r} is not declared: taken for a detector at {sensor.rate_hz:.3g} Hz")
+            found = "its scans are too few to tell a rate" if rate is None else f"it scans at {rate:.3g} Hz"
+            notes.append(f"sensor {name!r} is not declared: taken for a detector; {found}")
         elif other:
-            notes.append(f"sensor {name!r} scans at {rate:.3g} Hz, not at {known.rate_hz:g}")
+            # A rate that is the default may be one that nobody stated.
+            stated = "" if known.rate_hz == SensorConfig().rate_hz else f", not at {known.rate_hz:g}"
+            notes.append(f"sensor {name!r} scans at {rate:.3g} Hz{stated}")
         sensors[name] = sensor
     return replace(config, sensors=sensors), notes
 

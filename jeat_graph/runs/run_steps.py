@@ -63,7 +63,7 @@ class RunSteps:
         self._smooths = config.smoother.engine != "none"
         self._tracker = Tracker(config, diagnostics=options.diagnostics)
         self._reported: set[int] = set()
-        self._rows = {"causal": 0, "smoothed": 0}
+        self._rows = {"causal": 0, "smoothed": 0, "below_least": 0}
         self._done = 0
         self._unfinished: UnfinishedRun | None = None
         saved = None
@@ -110,6 +110,7 @@ class RunSteps:
                 step_s[k] = time.perf_counter() - start
                 self._reported.update(table.track_id.tolist())
                 self._write("causal", table)
+                self._rows["below_least"] += self._tracker.rows_below_least()
                 self._after_step(k)
                 bar.update()
             bar.refresh()
@@ -178,16 +179,29 @@ class RunSteps:
         states = self._tracker.sensor_states()
         record.learnt = {name: nan_as_null(one._asdict()) for name, one in states.items()}
         record.counts["causal_rows"] = self._rows["causal"]
-        detections = len(self._detections)
-        if detections >= _MANY and self._rows["causal"] < _LEAST_TRACKED * detections:
-            record.warnings.append(
-                f"{self._rows['causal']} rows of tracks from {detections} detections: nearly all of them are "
-                "taken for false; are the sensors' rates and the picture's size right?"
-            )
-            warnings.warn(record.warnings[-1], InputWarning, stacklevel=2)
+        doubt = self._doubt()
+        if doubt is not None:
+            record.warnings.append(doubt)
+            warnings.warn(doubt, InputWarning, stacklevel=2)
         if self._smooths:
             record.counts["smoothed_rows"] = self._rows["smoothed"]
             record.smoother = {"engine": self._config.smoother.engine, **self._tracker.smoother_counts}
+
+    def _doubt(self) -> str | None:
+        """Return a line if the causal table lacks so much that something must be wrong."""
+        rows, left_out, detections = self._rows["causal"], self._rows["below_least"], len(self._detections)
+        if left_out > rows:
+            least = self._config.output.min_existence
+            return (
+                f"output.min_existence={least:g} leaves out {left_out} of {rows + left_out} rows that would "
+                "be reported: see the column existence of a run without this setting"
+            )
+        if detections >= _MANY and rows < _LEAST_TRACKED * detections:
+            return (
+                f"{rows} rows of tracks from {detections} detections: nearly all of them are taken for "
+                "false; are the sensors' rates and the picture's size right?"
+            )
+        return None
 
 
 class _Files(ExitStack):

@@ -15,7 +15,7 @@ import numpy as np
 
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
-from jeat_graph.core import _core
+from jeat_graph.core import tracking as core
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
@@ -112,7 +112,7 @@ class ModelTracker(Updates, SavedModel):
         self._diagnostics = diagnostics
         self._smooths = config.smoother.engine != "none"
         # The core's has the methods of the reference.
-        make = cast(type[ReferenceModel], _core.tracking.Model) if engine == "core" else ReferenceModel
+        make = cast(type[ReferenceModel], core.Model) if engine == "core" else ReferenceModel
         known = config.input.picture == "given"
         size = (float(config.image.width), float(config.image.height)) if known else (1.0, 1.0)
         self._model = make(self.constants, *size, known, self._lag_s())
@@ -161,7 +161,8 @@ class ModelTracker(Updates, SavedModel):
                 the sensor looked and found nothing.
 
         Returns:
-            The reported tracks at that time.
+            The reported tracks at that time, no earlier rows: `Trajectories.concatenate` joins those of all
+            steps.
 
         Raises:
             DataError: boxes, scores or embeddings that are not valid, or too many sensors.
@@ -294,12 +295,17 @@ class ModelTracker(Updates, SavedModel):
             sensor_index(scan.sensor, self.sensor_names)
 
     def causal(self) -> Trajectories:
-        """Return the tracks that are reported now, as the last step did."""
+        """Return the tracks that are reported now, as the last step did: not the rows of earlier steps."""
         if self._causal is None:
             now = self.time
             at = None if now is None else np.array([now])
             self._causal = self._table(with_classes(self._model.rows(), self._classes, self._called), at)
         return self._causal
+
+    def rows_below_least(self) -> int:
+        """Return how many rows of the last step `output.min_existence` left out of the table."""
+        least = self.config.output.min_existence
+        return 0 if least <= self.constants.report else int((self._model.rows()[4] < least).sum())
 
     def predict(self, t: float) -> Prediction:
         """Say where the tracks that are reported now will be at a time; nothing changes.

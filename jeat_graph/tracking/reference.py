@@ -131,13 +131,12 @@ def step(
         scan = correct_boxes(state, given, c)
         follow_picture(state, scan, motion, step_s, c)
         follow_camera(state, scan, dt, c)
-        before = state.tracks
         noise_scale[place] = math.exp(state.log_side_variance[given.sensor]) / c.side_std**2
         pairs = associate(state, scan, c)
         nis[place][pairs.box] = pairs.nis
         count_gaps(state, scan, pairs, c)
         learn_noise(state, scan, pairs, clock, c)
-        update(state, pairs, c)
+        before = update(state, pairs, c)
         count_hits_and_misses(state, scan, pairs, clock, c)
         free = count_clutter(state, scan, pairs, c)
         begin_tracks(state, scan, free, clock, c)
@@ -333,8 +332,12 @@ def learn_noise(
     state.tracks = replace(tracks, innovation=innovation, has_innovation=has_innovation)
 
 
-def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> None:
-    """Update the states of tracks by their boxes: heavy tails, and sides that are cut, have less weight."""
+def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> ReferenceTracks:
+    """Update the states of tracks by their boxes: heavy tails, and sides that are cut, have less weight.
+
+    Returns the tracks before it, as the smoother has them: a side that shows again is part of the prediction,
+    because the states before did not know of it.
+    """
     tracks, i, seen = state.tracks, pairs.track, pairs.innovation
     y, S, gone = seen.y[i, pairs.box], seen.S[i, pairs.box], seen.gone[i, pairs.box]
     R = box_sides.measured_variance(
@@ -343,8 +346,11 @@ def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> 
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     m, P, y = box_sides.uncover(mean[i], covariance[i], y, S, gone, c)
     H = box_sides.measurement_matrix(singer.expected_size(m))
+    mean[i], covariance[i] = m, P
+    before = replace(tracks, mean=mean.copy(), covariance=covariance.copy())
     mean[i], covariance[i] = box_sides.update(m, P, y, H, R)
     state.tracks = replace(tracks, mean=mean, covariance=covariance)
+    return before
 
 
 def count_hits_and_misses(

@@ -11,7 +11,8 @@ from benchmarks.__main__ import main
 from benchmarks.ablation import TERMS, judged, nearby, tables, without
 from benchmarks.constant_scores import made_ready, tables_of
 from benchmarks.judging import CAUSAL
-from benchmarks.recordings import RecordingSet, simulated
+from benchmarks.recordings import RecordingSet
+from benchmarks.simulated_sets import simulated
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.io.tables.detections_io import write_detections
 from jeat_graph.io.tables.truth_io import write_truth

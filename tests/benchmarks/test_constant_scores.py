@@ -19,7 +19,8 @@ from benchmarks.constant_scores import (
     tables_of,
 )
 from benchmarks.judging import CAUSAL, HEADLINE, SMOOTHED, scores_of
-from benchmarks.recordings import RecordingSet, simulated
+from benchmarks.recordings import RecordingSet
+from benchmarks.simulated_sets import simulated
 from jeat_graph import track
 from jeat_graph.data.errors import DataError
 from jeat_graph.filters.model_constants import ModelConstants

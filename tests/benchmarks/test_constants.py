@@ -27,7 +27,7 @@ from benchmarks.leaving_out import (
     most_influential,
     unnoticed,
 )
-from benchmarks.recordings import simulated
+from benchmarks.simulated_sets import simulated
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.io.tables.detections_io import write_detections
 from jeat_graph.io.tables.truth_io import write_truth

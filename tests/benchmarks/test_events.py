@@ -68,15 +68,14 @@ def test_each_measure_alone_changes_one_setting_and_all_change_three() -> None:
 
 def test_the_command_writes_and_shows_both_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--frames", "3", "--size", "128x80", "--scenarios", "night-nolight", "--jobs", "1"]
-    arguments += ["--parts", "noise", "motion"]
-    assert main(["events", *arguments, "--out", str(tmp_path)]) == 0
+    assert main(["event-cameras", *arguments, "--out", str(tmp_path)]) == 0
     shown = capsys.readouterr().out
     assert "all three" in shown
-    result = json.loads((tmp_path / "events.json").read_text(encoding="utf-8"))
+    result = json.loads((tmp_path / "event-cameras.json").read_text(encoding="utf-8"))
     noise = {r["row"]: r["noise_hz"] for r in result["noise"]}
     assert noise[BASELINE] > 3.0 * noise[ALL]
     assert result["rates"][0]["motion_hz"] > 0.0
-    assert main(["events", "--from", str(tmp_path / "events.json")]) == 0
+    assert main(["event-cameras", "--from", str(tmp_path / "event-cameras.json")]) == 0
     assert capsys.readouterr().out == shown
 
 
@@ -138,7 +137,7 @@ def test_the_table_of_throughput_says_what_is_not_installed(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("benchmarks.event_throughput.find_spec", lambda name: None)
-    assert main(["events", "--parts", "throughput", "--stream", "3000", "--size", "64x48"]) == 0
+    assert main(["events", "--stream", "3000", "--size", "64x48"]) == 0
     shown = capsys.readouterr().out
     assert shown.count("not installed") >= 10
     assert "decode EVT3" in shown

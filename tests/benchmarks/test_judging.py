@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from benchmarks.baselines import peers_here
-from benchmarks.judging import LEFT_OUT, MOVED, Contender, JudgeJob, altered, in_processes, judge, spread_text
-from benchmarks.recordings import RecordingSet, simulated
+from benchmarks.judging import LEFT_OUT, MOVED, Contender, JudgeJob, altered, judge, spread_text
+from benchmarks.processes import in_processes
+from benchmarks.recordings import RecordingSet
+from benchmarks.simulated_sets import simulated
 
 
 @pytest.mark.parametrize("workers", [1, 2])

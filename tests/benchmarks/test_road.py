@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.__main__ import main
 from benchmarks.road import tables
 from benchmarks.road_cost import causal_cost, lag_cost, many_vehicles
 from benchmarks.road_real import chosen_lengths, paired, speed_scores
+from benchmarks.road_real import tables as real_tables
 
 
 def test_tracks_are_paired_by_both_times_after_a_constant_is_taken_off() -> None:
@@ -42,12 +44,29 @@ def test_tables_pool_seeds_by_rows() -> None:
     names += ("across_rmse_m", "along_rmse_m", "speed_rmse_kmh", "speed_known")
     one = {"scenario": "day", "camera": "exact", "table": "smoothed", "rows": 3, **dict.fromkeys(names, 1.0)}
     other = one | {"rows": 1, "speed_rmse_kmh": 3.0, "nees": 5.0}
-    real = {"camera": "a", "lengths": "all", **speed_scores(np.array([0.5, -1.0]), np.ones(2))}
-    found = tables({"simulated": [one, other], "real": [real]})
+    found = tables({"simulated": [one, other], "costs": []})
     row = dict(zip(found["road-simulated"].columns, found["road-simulated"].rows[0], strict=True))
     assert row["speed_rmse_kmh"] == pytest.approx(np.sqrt((3 * 1 + 9) / 4))
     assert row["nees"] == pytest.approx(2.0)
-    assert [r[0] for r in found["road-real-all"].rows] == ["a", "all"]
+
+
+def test_tables_of_real_roads_pool_the_vehicles_of_all_cameras() -> None:
+    cameras = [
+        {"camera": name, "lengths": "two along", **speed_scores(np.array(errors), np.ones(len(errors)))}
+        for name, errors in (("a", [0.5, -1.0]), ("b", [3.0]))
+    ]
+    table = real_tables({"real": cameras})["road-real-two-along"]
+    rows = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
+    assert [row["camera"] for row in rows] == ["a", "b", "all"]
+    assert rows[-1]["vehicles"] == 3
+    assert rows[-1]["mean_kmh"] == pytest.approx(1.5)
+
+
+def test_a_folder_without_cameras_is_refused(tmp_path, capsys) -> None:
+    assert main(["road-real", str(tmp_path)]) == 2
+    assert "holds no cameras" in capsys.readouterr().err
+    assert main(["road-real"]) == 2
+    assert "give ROOT" in capsys.readouterr().err
 
 
 def test_thirty_vehicles_are_seen_by_both_sensors_at_their_rates() -> None:
@@ -62,7 +81,5 @@ def test_costs_are_shares_of_what_was_measured() -> None:
     causal, lag = causal_cost(1.2), lag_cost(1.6)
     assert causal["share"] > 0
     assert lag["real_time"] > 0
-    table = tables(
-        {"simulated": [], "real": [], "costs": [{"what": "causal", **causal}, {"what": "lag", **lag}]}
-    )
+    table = tables({"simulated": [], "costs": [{"what": "causal", **causal}, {"what": "lag", **lag}]})
     assert len(table["road-cost"].rows) == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 
@@ -104,8 +105,8 @@ def test_tables_and_pages_are_found_with_what_they_say(tmp_path):
 def test_a_table_that_is_renewed_says_how_it_was_made(tmp_path):
     page = tmp_path / "events.md"
     page.write_text("<!-- table: events-throughput -->\n<!-- end -->\n")
-    small = ["--parts", "throughput", "--stream", "2000", "--size", "64x48"]
-    assert main(["events", *small, "--readme", str(page), "--jobs", "1"]) == 0
+    small = ["--stream", "2000", "--size", "64x48"]
+    assert main(["events", *small, "--readme", str(page)]) == 0
     (entry,) = entries_of(page)
     assert entry.kind == "events"
     assert f"`python -m benchmarks events {' '.join(small)}` at " in page.read_text()
@@ -119,25 +120,55 @@ def test_the_command_line_that_is_named_leaves_out_where_the_result_goes():
 
 
 def test_imports_are_followed_through_functions_packages_and_folders_at_the_top():
-    files = sources_of("benchmarks.events")
+    files = sources_of("benchmarks.event_cameras")
     assert {
         "benchmarks/event_noise.py",
         "eval/tables.py",
         "jeat_graph/__init__.py",
-        "jeat_graph/core/events/evt3.hpp",
-        "jeat_graph/io/events/opening.py",
         "sehn/jeat_graph_sehn/scenarios/night.yaml",
     } <= files
     assert all((ROOT / path).is_file() for path in files)
     assert "benchmarks/stale.py" not in files
-    assert "jeat_graph/tracking/tracker.py" in sources_of("benchmarks.speed")
+    assert {"jeat_graph/tracking/tracker.py", "configs/default.yaml"} <= sources_of("benchmarks.speed")
+
+
+def test_of_what_is_compiled_the_imported_folders_count_with_their_headers():
+    events, tracker = sources_of("benchmarks.events"), sources_of("jeat_graph.tracking.model_tracker")
+    built = {"jeat_graph/core/module.cpp", "jeat_graph/core/CMakeLists.txt"}
+    assert built | {"jeat_graph/core/events/evt3.hpp", "jeat_graph/core/events/evt3_block.hpp"} <= events
+    assert not [path for path in events if path.startswith("jeat_graph/core/tracking/")]
+    assert built | {"jeat_graph/core/tracking/step.hpp", "jeat_graph/core/filters/singer.hpp"} <= tracker
+    assert "jeat_graph/core/events/evt3.hpp" not in tracker
+
+
+def test_no_header_of_the_core_is_overlooked():
+    core = ROOT / "jeat_graph" / "core"
+    every = set(core.rglob("*.?pp"))
+    found = {
+        ROOT / path
+        for module in core.glob("*/module.cpp")
+        for path in sources_of(f"jeat_graph.core.{module.parent.name}")
+    }
+    assert every <= found
+
+
+def test_only_the_core_itself_imports_the_extension():
+    """Others import a submodule from `jeat_graph.core`: what they depend on is seen in the text."""
+    users = [
+        path.relative_to(ROOT).as_posix()
+        for folder in ("jeat_graph", "filters", "association", "smoothers", "eval", "sehn", "benchmarks")
+        for path in (ROOT / folder).rglob("*.py")
+        if re.search(r"^\s*(from|import) .*\b_core\b", path.read_text(encoding="utf-8"), re.MULTILINE)
+    ]
+    assert users == ["jeat_graph/core/__init__.py"]
 
 
 def test_what_is_imported_when_it_runs_is_among_the_files_that_are_found():
     """The oracle: the interpreter's own list, after a small benchmark."""
     program = (
-        "import sys, pathlib, benchmarks.__main__ as m\n"
-        "m.main(['events', '--parts', 'throughput', '--stream', '500', '--size', '64x48'])\n"
+        "import argparse, sys\n"
+        "from benchmarks.events import measure, tables\n"
+        "tables(measure(argparse.Namespace(stream=500, size=(64, 48), seed=0)))\n"
         "names = ('jeat_graph', 'benchmarks')\n"
         "for name, module in sys.modules.items():\n"
         "    if name.split('.')[0] in names and getattr(module, '__file__', None):\n"
@@ -147,20 +178,15 @@ def test_what_is_imported_when_it_runs_is_among_the_files_that_are_found():
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
     )
     loaded = {line[2:] for line in done.stdout.splitlines() if line.startswith("::") and line.endswith(".py")}
-    found = {str(ROOT / path) for path in sources_of("benchmarks.events")}
-    # The command line itself imports what every benchmark shares.
-    shared = {
-        str(ROOT / path) for path in sources_of("jeat_graph.cli.main") | sources_of("benchmarks.__main__")
-    }
     assert loaded
-    assert loaded <= found | shared
+    assert loaded <= {str(ROOT / path) for path in sources_of("benchmarks.events")}
 
 
 def test_every_page_of_the_documentation_names_its_commit():
     for page in sorted((ROOT / "docs" / "benchmarks").glob("*.md")):
         for entry in entries_of(page):
             assert entry.commit is not None, f"{entry.page}: {entry.table or 'the page'} names no commit"
-            assert entry.kind in KINDS or entry.kind in stale._COMMANDS
+            assert entry.kind in KINDS
 
 
 def test_rigs_say_how_they_were_made_and_can_be_read_again(tmp_path, monkeypatch, capsys):

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import build_parser, main
-from benchmarks.recordings import simulated
+from benchmarks.simulated_sets import simulated
 from jeat_graph.io.tables.detections_io import write_detections
 from jeat_graph.io.tables.truth_io import write_truth
 

@@ -197,6 +197,47 @@ def test_lanes_and_speeds_come_from_what_road_wrote(run, tmp_path):
     assert rows.flow.tolist() == [1, 1]
 
 
+def test_numbers_have_the_digits_that_mean_something(run, tmp_path):
+    """No 17 digits: times to a ms, flows to a tenth of a vehicle an hour."""
+    names = ("counts", "single", "stations", "od")
+    counts, single, stations, od = (tmp_path / f"{name}.csv" for name in names)
+    words = [
+        "count",
+        str(run),
+        "--line",
+        "gate=0,49.7,100,50.1",
+        "--line",
+        "b=0,20,100,20",
+        "--interval",
+        "0.7",
+    ]
+    more = ["--out", str(counts), "--crossings", str(single), "--stations", str(stations), "--od", str(od)]
+    assert main([*words, *more]) == 0
+    decimals = {
+        "t": 3,
+        "t_from": 3,
+        "t_to": 3,
+        "expected": 3,
+        "headway_s": 3,
+        "flow_per_hour": 1,
+        "occupancy": 2,
+    }
+    seen = set()
+    for path in (counts, single, stations, od):
+        for name, column in pd.read_csv(path, dtype=str).items():
+            longest = max((len(text.partition(".")[2]) for text in column.dropna()), default=0)
+            assert longest <= decimals.get(name, 12), (path.name, name)
+            seen.add(name)
+    assert set(decimals) <= seen
+    assert 5142.9 in pd.read_csv(stations).flow_per_hour.tolist()  # one in 0.7 s
+
+
+def test_detections_are_to_be_tracked_first(tmp_path, fails):
+    path = tmp_path / "cam.csv"
+    path.write_text("t,sensor,left,top,width,height,score\n0,rgb,1,2,3,4,0.9\n")
+    assert "run `jeat-graph track` on them first" in fails("count", str(path), "--line", "0,0,9,9")
+
+
 DATEX = ["--begin", "2026-11-27T07:30:00+01:00", "--publisher", "de:city-of-bonn", "--datex", "d.xml"]
 
 

@@ -247,7 +247,64 @@ def much_later(run):
     return run
 
 
-def test_the_number_of_truths_must_be_that_of_the_runs(run, truth, capsys):
-    code, _, err = call(capsys, run, run, "--gt", truth)
+def test_the_number_of_truths_must_be_one_or_that_of_the_runs(run, truth, capsys):
+    code, _, err = call(capsys, run, run, run, "--gt", truth, truth)
     assert code == 2
-    assert "2 RUN and 1 --gt given" in err
+    assert "3 RUN and 2 --gt given; give one truth for each run, or one for all of them" in err
+
+
+@pytest.fixture
+def bytetrack(tmp_path):
+    """Another tracker's result at every second frame of the truth, with a new identity half-way."""
+    lines = [f"{k + 1},{1 + (k >= 20)},{5 * k},0,40,20,0.9,-1,-1,-1" for k in range(0, 40, 2)]
+    path = tmp_path / "bytetrack.txt"
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_trackers_on_one_recording_have_a_row_each_with_the_scores_that_they_have_alone(
+    run, bytetrack, truth, capsys
+):
+    code, out, err = call(capsys, run, bytetrack, "--gt", truth, "--json", "-")
+    assert (code, err) == (0, "")
+    scores = json.loads(out)["runs"]
+    assert list(scores) == ["run", "bytetrack.txt"]
+    for path in (run, bytetrack):
+        assert scores[path.name] == json.loads(call(capsys, path, "--gt", truth, "--json", "-")[1])
+    theirs = scores["bytetrack.txt"]["causal"]
+    assert (theirs["FN"], theirs["FP"], theirs["IDSW"]) == (20, 0, 1)
+
+    table = call(capsys, run, bytetrack, "--gt", truth, "--format", "csv")[1].splitlines()
+    assert table[0].startswith("run,table,MOTA,")
+    assert [row.split(",")[:2] for row in table[1:]] == [
+        ["run", "causal"],
+        ["run", "smoothed"],
+        ["bytetrack.txt", "causal"],
+    ]
+
+
+def test_runs_of_one_name_in_two_folders_are_called_by_their_paths(bytetrack, truth, tmp_path, capsys):
+    (tmp_path / "other").mkdir()
+    other = tmp_path / "other" / bytetrack.name
+    other.write_text(bytetrack.read_text())
+    scores = json.loads(call(capsys, bytetrack, other, "--gt", truth, "--json", "-")[1])["runs"]
+    assert list(scores) == [str(bytetrack), str(other)]
+    code, _, err = call(capsys, other, other, "--gt", truth)
+    assert (code, err.strip().splitlines()) == (2, [f"jeat-graph eval: {other}: this RUN is given twice"])
+
+
+def test_each_tracker_on_one_recording_has_its_own_breakdown(run, bytetrack, truth, capsys):
+    code, out, _ = call(capsys, run, bytetrack, "--gt", truth, "--breakdown")
+    assert code == 0
+    assert "run: Waiting times" in out
+    assert "bytetrack.txt: Waiting times" in out
+    both = json.loads(call(capsys, run, bytetrack, "--gt", truth, "--breakdown", "--json", "-")[1])["runs"]
+    alone = json.loads(call(capsys, bytetrack, "--gt", truth, "--breakdown", "--json", "-")[1])
+    assert both["bytetrack.txt"]["breakdown"] == alone["breakdown"]
+
+
+def test_detections_and_roads_go_with_the_truth_and_not_with_its_runs(run, bytetrack, truth, capsys):
+    for option in ("--detections", "--road"):
+        code, _, err = call(capsys, run, bytetrack, "--gt", truth, option, truth, truth)
+        assert code == 2
+        assert f"1 --gt and 2 {option} given" in err

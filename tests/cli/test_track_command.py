@@ -123,6 +123,22 @@ def test_a_vehicle_seen_steadily_is_one_track(write, tmp_path):
     assert len(read_trajectories(tmp_path / "run" / "causal.csv")) == 0
 
 
+def test_a_least_existence_that_leaves_out_most_rows_is_said_with_their_number(write, tmp_path, capsys):
+    assert main(["track", write(*STEADY), "--out", str(tmp_path / "all")]) == 0
+    existence = read_trajectories(tmp_path / "all" / "causal.csv").existence
+    assert "min_existence" not in capsys.readouterr().err
+    levels = np.unique(existence)
+    for name, level in (("few", 0), ("most", len(levels) - 2)):
+        least = (levels[level] + levels[level + 1]) / 2.0
+        below = int((existence < least).sum())
+        setting = ["--set", f"output.min_existence={least:.9f}"]
+        assert main(["track", write(*STEADY), "--out", str(tmp_path / name), *setting]) == 0
+        line = f"leaves out {below} of {len(existence)} rows that would be reported"
+        assert (line in capsys.readouterr().err) == (below > len(existence) / 2) == (name == "most")
+        assert any(line in one for one in run_json(tmp_path / name)["warnings"]) == (name == "most")
+        assert len(read_trajectories(tmp_path / name / "causal.csv")) == len(existence) - below
+
+
 def test_settings_reach_the_tracker(write, tmp_path):
     known = ["--set", "sensors.rgb.even_score=0.99", "--set", "smoother.lag_s=0.5"]
     tables = []
@@ -159,7 +175,7 @@ def test_undeclared_sensors_are_refused_together_with_the_way_to_declare_them(wr
 def test_the_default_declares_sensors_by_what_is_seen_of_them_and_says_so(write, tmp_path, capsys):
     lines = [line.replace("rgb", "radar") for line in STEADY]
     assert main(["track", write(*lines), "--out", str(tmp_path / "run")]) == 0
-    assert "'radar' is not declared: taken for a detector at 20 Hz" in capsys.readouterr().err
+    assert "'radar' is not declared: taken for a detector; it scans at 20 Hz" in capsys.readouterr().err
     config = run_json(tmp_path / "run")["config"]
     assert config["sensors"].keys() == {"radar"}
     assert config["sensors"]["radar"]["rate_hz"] == pytest.approx(20.0)

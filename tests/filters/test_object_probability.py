@@ -89,7 +89,9 @@ def enumerated(evidence, sensors):
                 "moving": (1 - g) * b * moving[s],
                 "never": g * chance[s],
             }
-            weight *= ways[sees[s]] * odds[s]
+            # By chance a sensor finds clutter, with the scores of clutter; but it begins no track by chance.
+            by_chance = sees[s] == "never" and s != evidence.owner[0]
+            weight *= ways[sees[s]] * (1.0 if by_chance else odds[s])
         real += weight
     false = 0.0
     for owner in np.flatnonzero(found):
@@ -102,7 +104,8 @@ def enumerated(evidence, sensors):
                     weight *= seen[s]
                 else:
                     c = C.shared_false
-                    weight *= (c * seen[s] if common[s] else (1 - c) * chance[s]) * prior[s]
+                    by_chance = (1 - c) * chance[s] * (prior[s] if s == evidence.owner[0] else 1.0)
+                    weight *= c * seen[s] * prior[s] if common[s] else by_chance
             false += weight
     noise = sensors.noise_share / (1 - sensors.noise_share) * np.exp(-evidence.gained[0])
     noise *= np.prod([prior[s] for s in range(S) if s != evidence.owner[0]])
@@ -127,6 +130,17 @@ def test_posterior_is_the_enumeration_of_hypotheses(hits, misses, scores, gained
     assert op.posterior(evidence, sensors, C).real[0] == pytest.approx(
         enumerated(evidence, sensors), rel=1e-6
     )
+
+
+def test_a_coincidence_is_no_testimony_of_a_blind_sensor():
+    """A parked vehicle that one sensor sees; the other finds a poor box there once in hundreds of looks."""
+    sensors = sensors_of(2, stationary_unseen=0.05, prior_odds=1.0, indifference=0.3)
+    silent = evidence_of([60.0, 0.0], [1.0, 60.0], [2.5, np.nan], gained=30.0, stood=1.0)
+    once = evidence_of([60.0, 0.02], [1.0, 60.0], [2.5, -1.0], gained=30.0, stood=1.0)
+    before, after = (op.posterior(one, sensors, C).log_odds[0] for one in (silent, once))
+    assert before > 0.5
+    # Counted in full, its score and the sensor's prior would cost 1.7. What is left: evt may have invented it.
+    assert before - 0.3 < after < before
 
 
 @given(

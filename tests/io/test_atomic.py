@@ -56,3 +56,12 @@ def test_the_file_has_the_permissions_of_any_new_file(tmp_path):
         file.write("!")
     (tmp_path / "b.txt").write_text("!", encoding="utf-8")
     assert (tmp_path / "a.txt").stat().st_mode == (tmp_path / "b.txt").stat().st_mode
+
+
+def test_a_device_is_refused_and_stays_what_it_is(tmp_path):
+    """Renaming a file over it would take it away; a pipe of our own stands for /dev/null."""
+    device = tmp_path / "pipe"
+    os.mkfifo(device)
+    with pytest.raises(DataError, match="give the name of a file"), open_atomic(device) as file:
+        file.write("x")
+    assert device.is_fifo()

@@ -272,3 +272,10 @@ class TestKitti:
     def test_a_type_of_two_words_is_refused(self, tmp_path):
         with pytest.raises(DataError, match="one word"):
             write_kitti(simple((0.0, 1, 10)), tmp_path / "r.txt", object_type="sports car")
+
+
+@pytest.mark.parametrize("name", ["x.mot.txt", "x.TXT"])
+def test_a_name_of_text_by_frame_is_not_filled_with_csv(name, tmp_path):
+    with pytest.raises(DataError, match="write_motchallenge"):
+        write_trajectories(Trajectories.empty(), tmp_path / name)
+    assert not list(tmp_path.iterdir())

@@ -122,6 +122,23 @@ def test_a_run_without_a_log_of_its_detections_has_places_by_its_table(
     assert float(speed["low_kmh"]) < 79.2 < float(speed["high_kmh"])
 
 
+def test_the_camera_says_the_size_of_the_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """No box reaches the picture's edge, so that boxes alone do not tell it."""
+    rows = [f"{0.05 * k:.2f},rgb,{100 + 5 * k},200,60,40,0.9" for k in range(30)]
+    (tmp_path / "d.csv").write_text("t,sensor,left,top,width,height,score\n" + "\n".join(rows) + "\n")
+    write_camera(camera(), tmp_path / "camera.yaml")
+    command = ["track", str(tmp_path / "d.csv"), "--camera", str(tmp_path / "camera.yaml")]
+    assert main([*command, "--out", str(tmp_path / "run")]) == 0
+    error = capsys.readouterr().err
+    assert f"picture of {WIDTH} x {HEIGHT} px, as {tmp_path / 'camera.yaml'} says" in error
+    assert "as far as the boxes reach" not in error
+    image = json.loads((tmp_path / "run" / "run.json").read_text())["config"]["image"]
+    assert image == {"width": WIDTH, "height": HEIGHT}
+    assert main([*command, "--image", "640x480", "--out", str(tmp_path / "other")]) == 2
+    assert f"is of a picture of {WIDTH} x {HEIGHT} px, not of 640 x 480" in capsys.readouterr().err
+    assert not (tmp_path / "other").exists()
+
+
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [
@@ -208,7 +225,9 @@ def test_results_of_other_trackers_are_taken_in_every_format(tmp_path: Path, cap
         assert main([*command, "--rate", "20", "--interval", "1", "--contact", "bottom"]) == 0
         tables.append([row["speed_kmh"] for row in _rows(tmp_path / "out" / "speeds.csv")])
         counts = _rows(tmp_path / "out" / "counts.csv")
-        starts = [row["t_start"] for row in counts if row["lane"] == row["class"] == "all"]
+        starts = [
+            row["t_start"] for row in counts if row["direction"] == row["lane"] == row["class"] == "all"
+        ]
         assert list(map(float, starts)) == [0.0, 1.0, 2.0]
     assert len(tables[0]) == 1
     assert tables[0] == tables[1]

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from road_scenes import camera, drives, see
 
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.eval.counting import Line, crossings
 from jeat_graph.road.crossings import crossing, road_line
 from jeat_graph.road.lanes import LaneConfig, find_lanes
 from jeat_graph.road.motion_fit import MotionFitConfig, error_covariance, fit_motion, thinned
@@ -137,6 +139,59 @@ def test_a_line_is_crossed_when_the_vehicle_is_there() -> None:
     beside = road_line(cam, tuple(see(cam, np.array([[5.0, 30.0], [8.0, 30.0]])).ravel()), 0.0)
     assert beside is not None
     assert crossing(vehicle, beside) is None
+
+
+def _across(y: float) -> np.ndarray:
+    return np.array([[0.0, y], [8.0, y]])
+
+
+def test_a_line_shortly_beyond_what_is_seen_whole_is_crossed_too() -> None:
+    """Boxes end at y = 22.4 m and the track 1.5 s later: y = 12 is 0.5 s beyond them, y = 1 is 1.1 s."""
+    t = np.arange(0.0, 1.0, 0.02)
+    vehicle = _one(t, see(camera(), np.c_[np.full(50, 4.0), 42.0 - 20.0 * t]))
+    followed = replace(vehicle, t=np.arange(0.0, 2.5, 0.02))
+    last = float(vehicle.fit.t[-1])
+    found = crossing(followed, _across(42.0 - 20.0 * (last + 0.5)))
+    assert found is not None
+    assert found.t == pytest.approx(last + 0.5, abs=0.01)
+    assert found.speed.kmh == pytest.approx(72.0, abs=0.5)
+    assert found.speed.noise_kmh > vehicle.speed_at(0.5).noise_kmh
+    assert crossing(vehicle, _across(42.0 - 20.0 * (last + 0.5))) is None  # its track ends before
+    assert crossing(followed, _across(42.0 - 20.0 * (last + 1.1))) is None  # too long after its boxes
+    before = replace(vehicle, t=np.arange(-1.0, 1.0, 0.02))
+    found = crossing(before, _across(42.0 + 20.0 * 0.5))
+    assert found is not None
+    assert found.t == pytest.approx(-0.5, abs=0.02)
+
+
+def test_an_end_that_the_fit_does_not_believe_is_not_followed() -> None:
+    t = np.arange(0.0, 1.0, 0.02)
+    vehicle = _one(t, see(camera(), np.c_[np.full(50, 4.0), 42.0 - 20.0 * t]))
+    weight = np.where(vehicle.fit.t > 0.7, 0.0, 1.0)
+    astray = replace(vehicle, fit=vehicle.fit._replace(weight=weight), t=np.arange(0.0, 2.5, 0.02))
+    assert crossing(astray, _across(30.0)) is not None
+    assert crossing(astray, _across(26.0)) is None
+
+
+@pytest.mark.parametrize(("speed", "turned"), [(-20.0, False), (20.0, False), (-20.0, True), (20.0, True)])
+def test_directions_are_those_of_count(speed: float, turned: bool) -> None:
+    cam = camera()
+    t = np.arange(0.0, 1.0, 0.02)
+    pixels = see(cam, np.c_[np.full(50, 4.0), 30.0 + speed * (t - 0.5)])
+    line = see(cam, _across(30.0))[:: -1 if turned else 1].ravel()
+    ends = road_line(cam, tuple(line), 0.0)
+    assert ends is not None
+    found = crossing(_one(t, pixels), ends)
+    assert found is not None
+    nowhere = np.full((50, 6), np.nan)
+    mean = np.c_[pixels, np.zeros((50, 4))]
+    boxes = np.c_[pixels - 5.0, np.full((50, 2), 10.0)]
+    table = Trajectories(
+        t, np.ones(50, dtype=np.int64), boxes, np.ones(50), mean, nowhere, np.ones(50, dtype=np.int64)
+    )
+    (counted,) = crossings(table, Line(*line.tolist()))
+    assert found.direction == counted.direction
+    assert found.t == pytest.approx(counted.t, abs=0.01)
 
 
 def test_lanes_are_where_vehicles_drive() -> None:

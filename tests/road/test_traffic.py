@@ -12,10 +12,17 @@ from road_scenes import camera
 
 from jeat_graph.road.boxes_road import SizedVehicle
 from jeat_graph.road.inputs import RoadMarks
-from jeat_graph.road.lanes import LaneConfig
+from jeat_graph.road.lanes import LaneConfig, no_lanes
 from jeat_graph.road.motion_fit import MotionFit
 from jeat_graph.road.points_road import summarise
-from jeat_graph.road.results import LeftOut, RoadResult, Size, left_out_columns, speed_columns
+from jeat_graph.road.results import (
+    LeftOut,
+    RoadResult,
+    Size,
+    left_out_columns,
+    speed_columns,
+    with_own_classes,
+)
 from jeat_graph.road.road_page import render_road_page
 from jeat_graph.road.speeds import UNKNOWN_SPEED, ContactConfig, Speed, Vehicle, interval
 from jeat_graph.road.traffic import SummaryConfig, count_columns, headway_columns, speed_summary
@@ -48,6 +55,10 @@ def _result() -> RoadResult:
     )
 
 
+def _rows_of(columns, direction="all", lane="all", kind="all"):
+    return (columns["direction"] == direction) & (columns["lane"] == lane) & (columns["class"] == kind)
+
+
 def test_without_lines_all_are_counted_where_most_come_by() -> None:
     result = _result()
     assert {line for line, _, _ in result.crossings} == {"middle"}
@@ -65,20 +76,82 @@ def test_counts_by_lane_class_and_interval() -> None:
     assert ("slow", "car", 0.0, 4) in rows
     assert ("all", "all", 30.0, 2) in rows
     assert ("slow", "all", 30.0, 0) in rows
-    slow = (columns["lane"] == "slow") & (columns["class"] == "all")
+    slow = _rows_of(columns, lane="slow")
     assert columns["mean_kmh"][slow][0] == pytest.approx(3.6 * 21.5, abs=0.01)
     assert columns["per_hour"][slow][0] == pytest.approx(480.0)
 
 
 def test_intervals_in_which_nobody_came_by_have_rows_without_speeds() -> None:
     columns = count_columns(replace(_result(), span_s=(-5.0, 125.0)), SummaryConfig(interval_s=30.0))
-    whole = (columns["lane"] == "all") & (columns["class"] == "all")
+    whole = _rows_of(columns)
     assert columns["t_start"][whole].tolist() == [-30.0, 0.0, 30.0, 60.0, 90.0, 120.0]
     assert columns["count"][whole].tolist() == [0, 4, 2, 0, 0, 0]
     assert columns["per_hour"][whole].tolist() == [0.0, 480.0, 240.0, 0.0, 0.0, 0.0]
     assert np.isnan(columns["mean_kmh"][whole]).tolist() == [True, False, False, True, True, True]
-    keys = list(zip(*(columns[name].tolist() for name in ("lane", "class", "t_start")), strict=True))
-    assert len(keys) == len(set(keys)) == 6 * 6  # all, slow and fast lanes, cars and all classes, by interval
+    names = ("direction", "lane", "class", "t_start")
+    keys = list(zip(*(columns[name].tolist() for name in names), strict=True))
+    # All and one direction, all, slow and fast lanes, cars and all classes, by interval.
+    assert len(keys) == len(set(keys)) == 2 * 6 * 6
+
+
+def test_vehicles_an_hour_are_of_the_time_that_was_observed() -> None:
+    """Four vehicles in the ten seconds of the first half minute that were recorded: 1440 an hour."""
+    columns = count_columns(replace(_result(), span_s=(20.0 - 10.0, 20.0)), SummaryConfig(interval_s=30.0))
+    whole = _rows_of(columns)
+    assert columns["count"][whole].tolist() == [4, 2]
+    assert columns["observed"][whole].tolist() == [pytest.approx(100.0 / 3.0, abs=1e-3), 0.0]
+    assert columns["per_hour"][whole][0] == 1440.0
+    assert np.isnan(columns["per_hour"][whole][1])
+
+
+def test_rows_add_up_although_some_are_in_no_lane_and_of_no_class() -> None:
+    sized = [_vehicle(k, x, 10.0 + 3.0 * k, 20.0) for k, x in enumerate((0.0, 0.0, 3.6, 9.0))]
+    away = _vehicle(4, 0.0, 25.0, 20.0)
+    back = away._replace(
+        vehicle=replace(
+            away.vehicle, fit=away.vehicle.fit._replace(coefficients=np.array([[0, 0, 0], [50, -20, 0]]))
+        )
+    )
+    sized.append(back)
+    marks = RoadMarks({}, {"slow": (-1.8, 1.8), "fast": (1.8, 5.4)})
+    vehicles = [one.vehicle for one in sized]
+    result = summarise(vehicles, camera(), marks, ContactConfig(0.0, 0.0, 0.0), LaneConfig(), sized)
+    result = with_own_classes(result, {0: "bus", 1: "taxi", 2: "", 3: "taxi"})
+    columns = count_columns(result, SummaryConfig())
+    assert columns["count"][_rows_of(columns)].tolist() == [5]
+    names = {"direction": ["left", "right"], "lane": ["slow", "fast", ""], "class": ["bus", "taxi", ""]}
+    key = {"direction": "direction", "lane": "lane", "class": "kind"}
+    for column, values in names.items():
+        assert set(columns[column].tolist()) == {"all", *values}
+        parts = [columns["count"][_rows_of(columns, **{key[column]: one})].sum() for one in values]
+        assert sum(parts) == 5
+    assert columns["count"][_rows_of(columns, lane="")].tolist() == [1]
+    assert columns["count"][_rows_of(columns, kind="")].tolist() == [2]
+    assert columns["count"][_rows_of(columns, direction="right")].tolist() == [1]
+
+
+def test_without_lanes_and_classes_only_directions_divide() -> None:
+    bare = replace(_result(), lanes=no_lanes(), classes=[""] * 6)
+    columns = count_columns(bare, SummaryConfig())
+    assert columns["direction"].tolist() == ["all", "left"]
+    assert columns["lane"].tolist() == columns["class"].tolist() == ["all", "all"]
+
+
+def test_tracks_without_classes_keep_those_by_length() -> None:
+    result = _result()
+    assert with_own_classes(result, dict.fromkeys(range(6), "")).classes == result.classes
+
+
+def test_intervals_are_of_the_clock_that_is_given() -> None:
+    clock = SummaryConfig(interval_s=30.0, begin_s=1000.0)  # 10 s after a multiple of 30 s
+    columns = count_columns(replace(_result(), span_s=(0.0, 45.0)), clock)
+    whole = _rows_of(columns)
+    early = sum(one.t < 20.0 for _, _, one in _result().crossings)
+    assert columns["t_start"][whole].tolist() == [990.0, 1020.0]
+    assert columns["count"][whole].tolist() == [early, 6 - early]
+    assert 0 < early < 6
+    times = headway_columns(_result(), clock)["t"] - headway_columns(_result(), SummaryConfig())["t"]
+    np.testing.assert_allclose(times, 1000.0)
 
 
 def test_a_line_that_nobody_crosses_is_counted_too() -> None:
@@ -182,7 +255,7 @@ def test_speeds_that_are_not_known_are_left_out_of_the_page_and_the_means() -> N
     page = render_road_page(result, camera(), SummaryConfig(), "one unknown")
     assert "nan" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL).lower().split()
     columns = count_columns(result, SummaryConfig(interval_s=300.0))
-    whole = (columns["lane"] == "all") & (columns["class"] == "all")
+    whole = _rows_of(columns)
     assert columns["count"][whole].tolist() == [6]
     assert np.isfinite(columns["mean_kmh"][whole]).all()
     none = replace(result, speeds=[UNKNOWN_SPEED] * 6)

@@ -115,6 +115,19 @@ def test_two_scans_tell_no_rate():
     assert assumed == 20.0
 
 
+def test_only_a_rate_that_was_stated_is_held_against_the_scans():
+    seen = camera(0.0, name="gantry", rate=25.0)
+    score_alone = load_config("default", ["sensors.gantry.even_score=0.4"])
+    stated = load_config("default", ["sensors.gantry.rate_hz=10"])
+    assert fit_input(score_alone, seen)[1][0] == "sensor 'gantry' scans at 25 Hz"
+    assert fit_input(stated, seen)[1][0] == "sensor 'gantry' scans at 25 Hz, not at 10"
+
+
+def test_a_rate_that_cannot_be_measured_is_not_made_up():
+    notes = fit_input(load_config("default"), camera(0.0, scans=2))[1]
+    assert notes[0].endswith("taken for a detector; its scans are too few to tell a rate")
+
+
 def test_a_sensor_declared_by_its_rate_alone_is_as_an_undeclared_one():
     seen = camera(0.0, name="gantry")
     declared = load_config("default", ["sensors.gantry={rate_hz: 20}"])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from jeat_graph import Tracker, Trajectories, load_config
 from jeat_graph.cli.main import main
-from jeat_graph.core import _core
+from jeat_graph.core import tracking as compiled
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.tracking.model_tracker import ModelTracker
 from jeat_graph.tracking.reference_model import ReferenceModel
@@ -69,7 +69,7 @@ def drawn_stream(seed, sensors, times, motions=False):
 def models(lag_s, known, **changes):
     made = [
         make(ModelConstants(**changes), 1600.0, 1200.0, known, lag_s)
-        for make in (_core.tracking.Model, ReferenceModel)
+        for make in (compiled.Model, ReferenceModel)
     ]
     return made
 

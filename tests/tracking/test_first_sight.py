@@ -123,6 +123,8 @@ def test_stream_takes_any_name_and_says_so_once(monkeypatch, capsys, tmp_path):
     out, err = capsys.readouterr()
     assert len(out.splitlines()) == 30
     assert err.count("'cam1' is not declared") == err.count("'gantry 7' is not declared") == 1
+    assert err.count("taken for a detector; without a scan for 1 s it counts as silent") == 2
+    assert " Hz" not in err, "nobody has measured a rate yet"
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO("\n".join(lines[30:]).encode())))
     assert main(command) == 0
     out, err = capsys.readouterr()

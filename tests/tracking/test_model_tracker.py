@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jeat_graph import Tracker, load_config
-from jeat_graph.core import _core
+from jeat_graph.core import tracking as compiled
 from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError, TimeOrderError
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.score_calibration import logit
@@ -180,7 +180,7 @@ def test_embeddings_of_another_length_are_refused_and_change_nothing():
 
 def test_looks_decide_who_takes_a_box_and_not_whether_there_is_an_object():
     answers = []
-    for make in (_core.tracking.Model, ReferenceModel):
+    for make in (compiled.Model, ReferenceModel):
         model = make(ModelConstants(), 1280.0, 720.0, True, -1.0)
         model.declare_sensor()
         one = np.ones(1, np.int64)
@@ -195,7 +195,7 @@ def test_looks_decide_who_takes_a_box_and_not_whether_there_is_an_object():
 
 
 def test_what_is_compared_must_be_of_the_tracks_and_the_boxes():
-    model = _core.tracking.Model(ModelConstants(), 1280.0, 720.0, True, -1.0)
+    model = compiled.Model(ModelConstants(), 1280.0, 720.0, True, -1.0)
     model.declare_sensor()
     none, one = np.zeros(1, np.int64), np.ones(1, np.int64)
     box = np.array([[0.0, 0.0, 10.0, 10.0]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from jeat_graph.core import _core
+from jeat_graph.core import tracking as compiled
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.score_calibration import logit
 
@@ -56,7 +56,7 @@ def share_tracked(seed):
     )
     # Five hits are to be expected within this time; or one second.
     known = max(5.0 / sum(s["rate"] * s["p_detect"] for s in pair), 1.0)
-    model = _core.tracking.Model(ModelConstants(), *PICTURE, True, -1.0)
+    model = compiled.Model(ModelConstants(), *PICTURE, True, -1.0)
     model.declare_sensor()
     model.declare_sensor()
     told = moments = 0

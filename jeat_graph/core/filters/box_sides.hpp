@@ -159,8 +159,9 @@ inline void vary_side(double* P, double d, double along) {
 
 // Where it is likelier that a side has been cut so far and now shows further out than that both sides measure as
 // before, nothing is known of that side: the state takes it as it is measured, and P grows by d^2 along it.
-inline void uncover(double* mean, double* P, double& left, double& right, const Pair2& S, double size,
+inline bool uncover(double* mean, double* P, double& left, double& right, const Pair2& S, double size,
                     const ModelConstants& c) {
+    bool shows = false;
     const double both = -0.5 * S.squared_distance(left, right) - 0.5 * log_of(S.determinant()) - kLog2Pi;
     const double out[] = {-left, right}, other[] = {right, left}, variance[] = {S.rr, S.ll};
     for (int side = 0; side < 2; ++side) {
@@ -173,21 +174,35 @@ inline void uncover(double* mean, double* P, double& left, double& right, const 
         mean[kLogSize] = log_of(whole) - mean[kSizeError];
         (side == 0 ? left : right) = 0.0;
         vary_side(P, out[side], sign / whole);
+        shows = true;
     }
+    return shows;
 }
 
-// Update a track by a box: heavy tails, and sides that are cut, have less weight.
-inline void update(double* mean, double* covariance, const std::array<double, 4>& y, const SidesExpected& expected,
-                   const Edges& gone, const ModelConstants& c) {
+// The same on both axes; what is left of the innovations y. Says whether a side shows again.
+inline bool uncover_sides(double* mean, double* covariance, std::array<double, 4>& y, const SidesExpected& expected,
+                          const Edges& gone, const ModelConstants& c) {
+    bool shows = false;
+    for (int axis = 0; axis < 2; ++axis)
+        if (!gone.at[2 * axis] && !gone.at[2 * axis + 1])
+            shows |= uncover(mean + axis * kStates, covariance + axis * kMatrix, y[2 * axis], y[2 * axis + 1],
+                             expected.S[axis], expected.size[axis], c);
+    return shows;
+}
+
+// Update a track by a box: heavy tails, and sides that are cut, have less weight. Left over are the innovations y of
+// the state as it is after `uncover_sides`.
+inline void update(double* mean, double* covariance, const std::array<double, 4>& y, const std::array<double, 4>& left_over,
+                   const SidesExpected& expected, const Edges& gone, const ModelConstants& c) {
     const double heavy = 1.0 / student_weight(squared_distance(y, expected.S), c);
     for (int axis = 0; axis < 2; ++axis) {
-        double left = y[2 * axis], right = y[2 * axis + 1];
+        const double left = y[2 * axis], right = y[2 * axis + 1];
         double *const m = mean + axis * kStates, *const P = covariance + axis * kMatrix;
         const auto cut = cut_probabilities(left, right, expected.S[axis], expected.size[axis], c);
         const double R = expected.variance[axis] * (cut[0] + cut[1] > 0.5 ? 1.0 : heavy);
-        if (!gone.at[2 * axis] && !gone.at[2 * axis + 1]) uncover(m, P, left, right, expected.S[axis], expected.size[axis], c);
         const double none = square(kUnmeasured * expected.size[axis]);
-        update_axis(m, P, left, right, exp_of(m[kLogSize] + m[kSizeError]), gone.at[2 * axis] ? none : R / std::max(1.0 - cut[0], kLeastProbability),
+        update_axis(m, P, left_over[2 * axis], left_over[2 * axis + 1], exp_of(m[kLogSize] + m[kSizeError]),
+                    gone.at[2 * axis] ? none : R / std::max(1.0 - cut[0], kLeastProbability),
                     gone.at[2 * axis + 1] ? none : R / std::max(1.0 - cut[1], kLeastProbability));
     }
 }

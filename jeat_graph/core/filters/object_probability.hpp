@@ -66,7 +66,6 @@ public:
             const double h = e.hits[first + s], m = e.misses[first + s];
             seen_[s] = log_beta(a_[s] + h, b_[s] + m) - log_beta_[s];
             const double chance = h * log_chance_ + m * log_no_chance_;
-            const double never = log_unseen_[s] + chance;
             const double hs = e.stationary_hits[first + s], ms = e.stationary_misses[first + s];
             double sees = seen_[s];
             out_.stationary_unseen[s] = 0.0;
@@ -76,14 +75,17 @@ public:
                 sees = log_add(blind, log_not_stationary_[s] + seen_[s]);
                 out_.stationary_unseen[s] = exp_of(blind - sees);
             }
-            const double object = log_add(never, log_not_unseen_[s] + sees);
-            out_.unseen[s] = exp_of(never - object);
-            shared_[s] = log_add(log_not_shared_ + chance, log_shared_ + seen_[s]);
-            const bool found = e.found[first + s];
+            const bool found = e.found[first + s], began = static_cast<std::size_t>(e.owner[row]) == s;
+            const double prior = found ? sensors_.prior_odds[s] : 0.0;
             scores_[s] = found ? sensors_.indifference[s] + score(e, first + s) : 0.0;
+            // Scores of what a sensor finds by chance are those of clutter; but a track does not begin by chance.
+            const double never = log_unseen_[s] + chance + (began ? scores_[s] : 0.0);
+            const double object = log_add(never, log_not_unseen_[s] + sees + scores_[s]);
+            out_.unseen[s] = exp_of(never - object);
+            shared_[s] = log_add(log_not_shared_ + chance + (began ? prior : 0.0), log_shared_ + seen_[s] + prior);
             best_score = std::max(best_score, scores_[s]);
-            real += object + scores_[s];
-            if (found) shared_[s] += sensors_.prior_odds[s], priors += sensors_.prior_odds[s];
+            real += object;
+            priors += prior;
             others += shared_[s];
         }
         const double doubt = 1.0 / (1.0 + exp_of(clamp(best_score - c_.duplicate_log_odds, -kMostLogOdds, kMostLogOdds)));

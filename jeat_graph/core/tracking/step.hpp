@@ -58,7 +58,7 @@ public:
             associate(scan);
             count_gaps();
             learn_noise(scan, clock);
-            update();
+            update(record);
             count_hits_and_misses(scan, clock);
             count_clutter(scan);
             begin_tracks(scan, clock);
@@ -368,13 +368,18 @@ private:
         filters::learn_noise(sums, clock.period_s, s_.log_side_variance[scan.sensor], s_.process_noise, c_);
     }
 
-    void update() {
+    void update(Record* record) {
         Tracks& tracks = s_.tracks;
+        smoothers::Entry* const entries = record ? record->last_scan() : nullptr;
         for (std::size_t m = 0; m < made_.size(); ++m) {
             const std::size_t i = pairs_[made_[m]].row;
             const Edges cut = unmeasured(innovations_[m], edges_[pairs_[made_[m]].column]);
-            filters::update(tracks.mean_of(i), tracks.covariance_of(i), innovations_[m],
-                            cut.any() ? with_cut(expected_[i], cut, c_) : expected_[i], cut, c_);
+            const SidesExpected expected = cut.any() ? with_cut(expected_[i], cut, c_) : expected_[i];
+            std::array<double, 4> left_over = innovations_[m];
+            // To the smoother a side that shows again is part of the prediction: the states before did not know of it.
+            if (filters::uncover_sides(tracks.mean_of(i), tracks.covariance_of(i), left_over, expected, cut, c_) && record)
+                write_prediction(entries[i], i);
+            filters::update(tracks.mean_of(i), tracks.covariance_of(i), innovations_[m], left_over, expected, cut, c_);
         }
     }
 
@@ -576,6 +581,9 @@ private:
     void begin_entry(smoothers::Entry& entry, std::size_t row, double dt) {
         entry.t = s_.t;
         entry.dt = dt;
+        write_prediction(entry, row);
+    }
+    void write_prediction(smoothers::Entry& entry, std::size_t row) {
         std::copy_n(s_.tracks.mean_of(row), kMean, entry.predicted_mean.begin());
         smoothers::halve(s_.tracks.covariance_of(row), entry.predicted_covariance);
     }

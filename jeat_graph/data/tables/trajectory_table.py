@@ -26,7 +26,10 @@ MORE_COLUMNS = (*RUN_CLASSES, *SIZE_VAR)
 RESULT_COLUMNS = ("t", "object_id", *BOX)
 MORE_RESULT_COLUMNS = ("score", *ASIDE)
 #: What is said of boxes without identities.
-NO_IDENTITIES = "has no identities (a column or field such as track_id); are these detections?"
+NO_IDENTITIES = (
+    "has no identities (a column or field such as track_id); if these are detections, run `jeat-graph track` "
+    "on them first and give the run directory that it writes"
+)
 #: Joins the names of sensors in their column.
 JOINT = "|"
 _MOST_SENSORS = 63  # bits of `Trajectories.used`

@@ -45,6 +45,9 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         DataError: no file can be made there, or what is there cannot be replaced by one.
     """
     target = Path(path)
+    if target.exists() and not (target.is_file() or target.is_dir()):
+        # Renaming would put a file in the place of a device, /dev/null too.
+        raise DataError("is a device or a pipe: give the name of a file", path)
     with naming(path):
         target.parent.mkdir(parents=True, exist_ok=True)
     prefix = f".{target.stem}.unfinished-"

@@ -133,7 +133,18 @@ def rounded(table: Trajectories) -> tuple[FloatArray, FloatArray, FloatArray, Fl
 
 
 def write_trajectories(table: Trajectories, path: str | Path) -> None:
-    """Write a table of the contract as CSV, or as Parquet where the name ends so."""
+    """Write a table of the contract as CSV, or as Parquet where the name ends in `.parquet` or `.pq`.
+
+    Raises:
+        DataError: the name ends in `.txt`, as results of MOTChallenge and KITTI do: these are written by
+            `jeat_graph.io.exports.frame_results`; or a sensor's name holds `|`.
+    """
+    if Path(path).suffix.lower() == ".txt":
+        raise DataError(
+            "this writes CSV or Parquet; write_motchallenge and write_kitti of "
+            "jeat_graph.io.exports.frame_results write text by frame",
+            path,
+        )
     with TrajectoryWriter(path, classes=table.classes is not None) as writer:
         writer.append(table)
 

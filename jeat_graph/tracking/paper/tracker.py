@@ -221,6 +221,10 @@ class PaperTracker(Updates):
         table = table_of(self._reported(), t, self.config, self.sensor_names, self._classes)
         return self._numbered(replace(table, instants=None if self._t is None else np.array([t])))
 
+    def rows_below_least(self) -> int:
+        """Return how many rows `output.min_existence` left out: none, confirmed tracks have existence 1."""
+        return 0
+
     def predict(self, t: float) -> Prediction:
         """Say where the confirmed tracks will be at a time, and how surely; the tracker stays as it is.
 
