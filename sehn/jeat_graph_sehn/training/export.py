@@ -28,6 +28,8 @@ from jeat_graph_sehn.training.serving import ServedNet
 _OPSET = 17
 #: Smaller tensors are not worth a cast.
 _LEAST_HALVED = 64
+#: From here on the hyperbolic tangent is ±1 in single precision.
+_TANH_IS_ONE = 16.0
 _CLASS = "vehicle"
 #: Name of the note in which detectors have their classes.
 NAMES = "names"
@@ -71,6 +73,7 @@ def write_onnx(
     model = onnx.load_from_string(buffer.getvalue())
     share_weights(model)
     spread_summands(model)
+    bound_tanh(model)
     halve_weights(model)
     if second_look:
         card = {**card, SECOND_LOOK: True}
@@ -124,6 +127,30 @@ def spread_summands(model: Any) -> None:
                 nodes.append(helper.make_node("Expand", [node.input[at], shape], [spread]))
                 node.input[at] = spread
         nodes.append(node)
+    del graph.node[:]
+    graph.node.extend(nodes)
+
+
+def bound_tanh(model: Any) -> None:
+    """Clip what goes into a hyperbolic tangent to where it changes: OpenCV 5 gives NaN for more than 44.
+
+    Args:
+        model: as ONNX has it; changed. Its outputs stay as they are.
+    """
+    from onnx import helper, numpy_helper
+
+    graph, nodes = model.graph, []
+    bounds = {"tanh_low": -_TANH_IS_ONE, "tanh_high": _TANH_IS_ONE}
+    for node in graph.node:
+        if node.op_type == "Tanh":
+            clipped = f"{node.output[0]}_clipped"
+            nodes.append(helper.make_node("Clip", [node.input[0], *bounds], [clipped]))
+            node.input[0] = clipped
+        nodes.append(node)
+    if len(nodes) > len(graph.node):
+        graph.initializer.extend(
+            numpy_helper.from_array(np.array(value, dtype=np.float32), name) for name, value in bounds.items()
+        )
     del graph.node[:]
     graph.node.extend(nodes)
 

@@ -14,7 +14,7 @@ from jeat_graph.detection.models.model_settings import ModelSettings  # noqa: E4
 from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
 from jeat_graph.detection.models.pictures import ModelPictureDetector  # noqa: E402
 from jeat_graph.detection.settings import EventSettings  # noqa: E402
-from jeat_graph_sehn.training.export import spread_summands, write_onnx  # noqa: E402
+from jeat_graph_sehn.training.export import bound_tanh, spread_summands, write_onnx  # noqa: E402
 from jeat_graph_sehn.training.network import DetectionNet  # noqa: E402
 from jeat_graph_sehn.training.serving import ServedNet  # noqa: E402
 from jeat_graph_sehn.training.settings import NetSettings  # noqa: E402
@@ -136,3 +136,17 @@ def test_summands_of_the_same_shape_stay_as_they_are():
     before = model.SerializeToString(deterministic=True)
     spread_summands(model)
     assert model.SerializeToString(deterministic=True) == before
+
+
+def test_opencv_takes_the_tangent_of_large_numbers(tmp_path):
+    onnx = pytest.importorskip("onnx", reason="pip install onnx")
+    helper, kind = onnx.helper, onnx.TensorProto.FLOAT
+    x = np.linspace(-200.0, 200.0, 801, dtype=np.float32).reshape(1, 1, 1, -1)
+    ports = [helper.make_tensor_value_info(name, kind, x.shape) for name in "xy"]
+    graph = helper.make_graph([helper.make_node("Tanh", ["x"], ["y"])], "net", ports[:1], ports[1:])
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    bound_tanh(model)
+    path = tmp_path / "net.onnx"
+    path.write_bytes(model.SerializeToString())
+    found = open_engine(path, read_onnx_head(path), "opencv", 1).run({"x": x})["y"]
+    np.testing.assert_allclose(found, np.tanh(x), rtol=1e-5, atol=1e-6)

@@ -51,6 +51,9 @@ def test_shipped_networks_run_with_the_base_install(kind, name):
     head = read_onnx_head(path)
     rng = np.random.default_rng(3)
     given = {port.name: rng.integers(0, 2, port.shape).astype(port.kind) for port in head.inputs}
+    if kind != "frames":  # many events in one place drive the memory far beyond where its tanh is 1
+        given["events"][:] = 0
+        given["events"][:, :, 100:150, 100:200] = 20
     found = open_engine(path, head, "opencv", 1).run(given)
     for port in head.outputs:
         assert found[port.name].shape == port.shape
