@@ -22,7 +22,7 @@ from jeat_graph.live.late import LiveTracker, check_saved
 from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.service.cameras import Cameras
 from jeat_graph.live.service.config import ServiceConfig
-from jeat_graph.live.service.ends import OpenedSource, Sinks, open_sinks, open_sources
+from jeat_graph.live.service.ends import OpenedSource, Sinks, check_packages, open_sinks, open_sources
 from jeat_graph.live.service.log import ERROR, INFO, WARNING, Log
 from jeat_graph.live.service.status import RUNNING, STOPPING, Status
 from jeat_graph.live.service.systemd import Watchdog, notify
@@ -77,7 +77,8 @@ class Service:
             0 after a signal, 1 after trouble that a new start may mend.
 
         Raises:
-            ConfigError: a file, a setting or an address that is not valid, or an old checkpoint.
+            ConfigError: a file, a setting or an address that is not valid, a package that is missing, or an
+                old checkpoint.
         """
         config, log, status = self._config, self._log, self.status
         with ExitStack() as stack:
@@ -86,7 +87,8 @@ class Service:
             for path in (config.state.checkpoint, config.state.smoothed):
                 if path is not None:
                     stack.enter_context(hold_file(path))
-            tracker = config.tracker  # what is wrong of these is known before anything is opened
+            check_packages(config)  # what is wrong of these is known before anything is opened
+            tracker = config.tracker
             settings = load_config(tracker.config, list(tracker.set), tracker.rig)
             if config.state.checkpoint is not None:
                 check_saved(Tracker(settings), "state.checkpoint")
