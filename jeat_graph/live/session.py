@@ -14,6 +14,7 @@ from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError, Un
 from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.clock_watch import ClockNews
+from jeat_graph.live.commit_pace import CommitPace
 from jeat_graph.live.counts import Counts, count_lines
 from jeat_graph.live.health import CLOCK, HealthChange, SensorHealth
 from jeat_graph.live.late import LiveTracker
@@ -123,6 +124,7 @@ class Session:
             self._health.last = kept.get("last", {})
             self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
             self._health.usual = kept.get("usual", {})
+        self._pace = CommitPace()
         self._told = Told(ends.warn, live.tracker.config.live.jump_s)
         self._owed = False  # the tracker has taken a scan whose answer has not gone out
         self._unconfirmed = ""  # or why the last answers may not have arrived
@@ -221,6 +223,14 @@ class Session:
             }
             self.live.save(self._checkpoint, more)
         self.ends.commit()
+        self._pace.committed()
+
+    def save_in_turn(self, open_: int, most_open: int, quiet: bool) -> bool:
+        """Save if it is time to tell the source (see `CommitPace.due`); whether it was."""
+        due = self._pace.due(open_, most_open, quiet)
+        if due:
+            self.save()
+        return due
 
     def finish(self) -> None:
         """End all tracks, write the last smoothed rows, and sum up."""

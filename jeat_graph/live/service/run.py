@@ -35,8 +35,6 @@ from jeat_graph.tracking.tracker import Tracker
 
 #: Timeout of a receive (s): of the only source, and of one of several.
 _ALONE_S, _BESIDE_S = 0.2, 0.05
-#: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
-_COMMIT_PART = 0.5
 #: So many messages of one source are taken before the next one's turn.
 _IN_A_ROW = 16
 #: Exit codes: ended as asked; ended by trouble that a new start may mend.
@@ -281,8 +279,7 @@ class Service:
                 message = None
             if message is not None:
                 self._take(message, place, running)
-        if one.open and (payload is None or one.open >= _COMMIT_PART * one.source.most_open):
-            running.session.save()
+        running.session.save_in_turn(one.open, one.source.most_open, payload is None)
         return payload is not None
 
     def _take(self, message: ScanMessage, place: str, running: _Running) -> None:
