@@ -230,11 +230,11 @@ def test_all_sensors_may_fall_silent_and_each_is_named_once(monkeypatch):
     monkeypatch.setattr("jeat_graph.live.service.status.time.monotonic", lambda: now[0])
     status = Status("gate", silent_s=10.0)
     scan = {name: Scan(1.0, name, np.zeros((0, 4)), np.zeros(0)) for name in ("rgb", "evt")}
-    status.came(scan.values())
+    status.came(scan.values(), scan)
     now[0] = 109.0
     assert status.changes_of_silence() == []
     now[0] = 112.0
     assert status.changes_of_silence() == [("rgb", 12.0), ("evt", 12.0)]
     assert status.changes_of_silence() == []
-    status.came([scan["evt"]])
+    status.came([scan["evt"]], ["evt"])
     assert status.changes_of_silence() == [("evt", None)]

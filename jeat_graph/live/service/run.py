@@ -286,15 +286,17 @@ class Service:
         self._came = time.monotonic()
         session, counted = running.session, self.status.counted
         counted.taken += 1
-        before = session.duplicates
+        before, arrival = session.duplicates, None
         try:
-            session.accept(message, place)
+            arrival = session.accept(message, place)
         except MESSAGE_ERRORS as error:
             self._bad(of_message(error, place), running)
         counted.duplicates = session.duplicates
         if session.duplicates == before:
-            self.status.came(message.batch.scans)
+            kept = () if arrival is None else (*arrival.taken, *arrival.waiting)
+            self.status.came(message.batch.scans, {scan.sensor for scan in kept})
         counted.passed_over = session.live.lateness.dropped
+        self.status.passed_over = session.live.lateness.dropped_by_sensor()
         self.status.clocks = dict(session.live.clocks)
 
     def _bad(self, error: DataError, running: _Running) -> None:
