@@ -69,8 +69,8 @@ class Metrics:
             if name != "passed_over":  # scans, by sensor
                 text = f"messages or checkpoints {name.replace('_', ' ')}"
                 yield family(counter, name, text, [([], value)])
-        rows = [([sensor], value) for sensor, value in status.passed_over.items()]
-        yield family(counter, "passed_over", "scans of a sensor passed over", rows, "sensor")
+        passed = [([sensor], float(count)) for sensor, count in status.passed_over.items()]
+        yield family(counter, "passed_over", "scans of a sensor passed over", passed, "sensor")
         yield family(counter, "dropped", "pictures dropped and scans passed over", [([], status.dropped)])
         sensors = health["sensors"].items()
         for name, key in (("scans", "scans"), ("boxes", "boxes")):
