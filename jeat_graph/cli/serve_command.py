@@ -14,7 +14,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "jeat-graph serve --set-aside-damaged gantry7.yaml"
     )
     parser.add_argument("service", metavar="CONFIG.yaml", help="the file; docs/guides/service.md explains it")
-    parser.add_argument("--check", action="store_true", help="only read the file and say whether it is valid")
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help="only say whether the file is valid and the clients of its brokers are installed",
+    )
     parser.add_argument(
         "--set-aside-damaged",
         action="store_true",
@@ -26,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal comes."""
     from jeat_graph.live.service.config import read_service
+    from jeat_graph.live.service.ends import check_packages
     from jeat_graph.live.service.log import WARNING, Log
     from jeat_graph.live.service.run import Service
 
@@ -34,6 +39,7 @@ def run(args: argparse.Namespace) -> int:
     for text in warnings:
         log.write(WARNING, text)
     if args.check:
+        check_packages(config)
         print(f"{args.service}: valid: {len(config.sources)} sources, {len(config.sinks)} sinks")
         return 0
     return Service(config, log, sets_aside_damaged=args.set_aside_damaged).run()

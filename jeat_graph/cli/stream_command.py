@@ -41,8 +41,6 @@ if TYPE_CHECKING:
 WRITES = ("checkpoint", "smoothed", "road", "record")
 HELP = "track scans as they arrive on stdin, from a broker or from live cameras, and answer each one at once"
 STDIN = "<stdin>"
-#: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
-_COMMIT_PART = 0.5
 _EVERY_S = 10.0
 _say = partial(say, "stream")
 
@@ -309,10 +307,11 @@ def _take_from(
     since = 0
     for item in from_source(source, str(source.address), interrupts, bad, how):
         if item is not None:
-            _take(session, *item, bad)
             since += 1
-        if since and (item is None or since >= _COMMIT_PART * source.most_open):
-            session.save()
+            message, place = item
+            if message is not None:
+                _take(session, message, place, bad)
+        if session.save_in_turn(since, source.most_open, item is None):
             since = 0
 
 

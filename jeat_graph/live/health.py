@@ -102,7 +102,7 @@ class SensorHealth:
             quiet = now - t > self._patience_s(name)
             if quiet and name not in self.silent:
                 self.silent.append(name)
-                text = f"sensor {name!r} has given no scan since t = {t:.6g} s"
+                text = f"sensor {name!r} has given no scan since t = {t:.3f} s"
                 events.append(HealthChange(now, name, SILENT, text))
             elif not quiet and name in self.silent:
                 self.silent.remove(name)

@@ -42,8 +42,10 @@ def from_source(
     interrupts: Interrupts,
     bad: Callable[[DataError], None] | None,
     how: StreamReading,
-) -> Iterator[tuple[ScanMessage, str] | None]:
-    """Yield the messages of a broker and their places; None where none came for a while, or one is left out.
+) -> Iterator[tuple[ScanMessage | None, str] | None]:
+    """Yield the messages of a broker and their places; None where none came for a while.
+
+    One that is left out, or cannot be read, is None beside its place: the broker counts it all the same.
 
     Args:
         source: the source.
@@ -59,15 +61,14 @@ def from_source(
             yield None
             continue
         number += 1
+        message = None
         try:
             message = decode_scans(payload, name, number, how)
         except DataError as error:
             if bad is None:
                 raise
             bad(error)
-            yield None
-            continue
-        yield None if message is None else (message, f"{name}:{number}: ")
+        yield message, f"{name}:{number}: "
 
 
 def from_cameras(cameras: LiveDetecting, until: Callable[[], bool]) -> Iterator[tuple[ScanMessage, str]]:

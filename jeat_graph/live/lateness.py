@@ -77,6 +77,10 @@ class LatenessCounter:
         """How many scans of all sensors were passed over."""
         return sum(one.dropped for one in self._by_sensor.values())
 
+    def dropped_by_sensor(self) -> dict[str, int]:
+        """How many scans of each sensor were passed over."""
+        return {name: one.dropped for name, one in self._by_sensor.items()}
+
     def add(self, sensor: str, late_s: float, dropped: bool) -> None:
         """Count a scan that is so much older than the newest (s); 0 if it is not."""
         one = self._by_sensor.setdefault(sensor, _Counted())

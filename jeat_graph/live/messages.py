@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.extras import install
 from jeat_graph.io.streams.scan_batch import ScanBatch
 from jeat_graph.io.streams.scan_lines import batch_of
@@ -91,6 +91,9 @@ def encode_tracks(line: str, seq: int, answered: ScanMessage | None, encoding: s
         seq: number of this message among those that go out.
         answered: the message that it answers, if it does.
         encoding: `json` or `msgpack`.
+
+    Raises:
+        ConfigError: MessagePack is not installed.
     """
     head: dict[str, Any] = {"v": VERSION, "seq": seq}
     if answered is not None and answered.seq is not None:
@@ -98,7 +101,7 @@ def encode_tracks(line: str, seq: int, answered: ScanMessage | None, encoding: s
     if encoding == "json":
         text = json.dumps(head, ensure_ascii=False, separators=(",", ":"))
         return (text[:-1] + "," + line.strip()[1:]).encode()
-    return bytes(_msgpack().packb(head | json.loads(line)))
+    return bytes(msgpack_package().packb(head | json.loads(line)))
 
 
 def _load(payload: bytes, name: str, number: int) -> Any:
@@ -109,7 +112,11 @@ def _load(payload: bytes, name: str, number: int) -> Any:
             what = error.msg if isinstance(error, json.JSONDecodeError) else str(error)
             raise DataError(f"is not JSON: {what}", name, number) from None
     try:
-        content = _msgpack().unpackb(payload, strict_map_key=True, timestamp=_TIMESTAMP_S)
+        package = msgpack_package()
+    except ConfigError as error:  # what anybody sends must not end a service
+        raise DataError(f"is not JSON, and {error}", name, number) from None
+    try:
+        content = package.unpackb(payload, strict_map_key=True, timestamp=_TIMESTAMP_S)
     except (ValueError, RecursionError) as error:
         raise DataError(f"is neither JSON nor MessagePack: {error}", name, number) from None
     scans = content.get("scans", [content]) if isinstance(content, dict) else content
@@ -130,11 +137,16 @@ def _unpack(scan: dict[Any, Any], name: str, number: int) -> None:
             scan[key] = flat.reshape(-1, 4) if key == "boxes" else flat
 
 
-def _msgpack() -> Any:
+def msgpack_package() -> Any:
+    """Return the package that reads and writes MessagePack.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
     try:
         import msgpack
     except ImportError:
-        raise JeatGraphError(f"MessagePack needs a package more: {install('msgpack')}") from None
+        raise ConfigError(f"MessagePack needs a package more: {install('msgpack')}") from None
     return msgpack
 
 

@@ -13,7 +13,9 @@ from jeat_graph.config.reading import config_to_dict
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError, UnknownSensorError
 from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.live.arrival import Arrival
 from jeat_graph.live.clock_watch import ClockNews
+from jeat_graph.live.commit_pace import CommitPace
 from jeat_graph.live.counts import Counts, count_lines
 from jeat_graph.live.health import CLOCK, HealthChange, SensorHealth
 from jeat_graph.live.late import LiveTracker
@@ -123,13 +125,14 @@ class Session:
             self._health.last = kept.get("last", {})
             self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
             self._health.usual = kept.get("usual", {})
+        self._pace = CommitPace()
         self._told = Told(ends.warn, live.tracker.config.live.jump_s)
         self._owed = False  # the tracker has taken a scan whose answer has not gone out
         self._unconfirmed = ""  # or why the last answers may not have arrived
         self._interval = None if live.time is None else live.time // every_s
 
-    def accept(self, message: ScanMessage, place: str = "") -> None:
-        """Take in a message of scans.
+    def accept(self, message: ScanMessage, place: str = "") -> Arrival | None:
+        """Take in a message of scans; returns what became of them, or None if it had been taken before.
 
         Args:
             message: scans of one time.
@@ -142,7 +145,7 @@ class Session:
         restarts = self._seen.restarts.get(message.source, 0)
         if not self._seen.is_new(message):
             self._passed_again(message, place)
-            return
+            return None
         if self._seen.restarts.get(message.source, 0) > restarts:
             self._told.restart(message, place)
         before = self.live.time
@@ -155,7 +158,7 @@ class Session:
         unanswered = sum(map(len, untaken))
         if len(arrival.repeated) == len(message.batch.scans):
             self._passed_again(message, place)
-            return
+            return None
         self.count += 1
         self.flat += message.batch.flat
         self._told.arrived(arrival, message.source, before, place)
@@ -178,6 +181,7 @@ class Session:
                     for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
                         self._tell(event)
         self._save_in_time(arrival.t)
+        return arrival
 
     def _passed_again(self, message: ScanMessage, place: str) -> None:
         """Count a message that had been taken before."""
@@ -221,6 +225,14 @@ class Session:
             }
             self.live.save(self._checkpoint, more)
         self.ends.commit()
+        self._pace.committed()
+
+    def save_in_turn(self, open_: int, most_open: int, quiet: bool) -> bool:
+        """Save if it is time to tell the source (see `CommitPace.due`); whether it was."""
+        due = self._pace.due(open_, most_open, quiet)
+        if due:
+            self.save()
+        return due
 
     def finish(self) -> None:
         """End all tracks, write the last smoothed rows, and sum up."""

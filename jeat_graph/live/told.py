@@ -48,7 +48,7 @@ class Told:
         if run is not None:
             self._warn(
                 f"warning: {place}the last {run.count} messages had been taken before and are passed over, "
-                f"up to t = {message.batch.t:.6g} s"
+                f"up to t = {message.batch.t:.3f} s"
             )
 
     def arrived(self, arrival: Arrival, source: str, before: float | None, place: str) -> None:
@@ -79,18 +79,18 @@ class Told:
         if arrival.anew:
             self._warn(
                 "warning: scans have been too late for long, so a clock was set back: all tracks end, and "
-                f"time goes on from t = {arrival.t:.6g} s"
+                f"time goes on from t = {arrival.t:.3f} s"
             )
         if arrival.leapt and before is not None:
             self._warn(
-                f"warning: after a pause, or a leap of a clock, of {arrival.t - before:.6g} s time goes on "
-                f"from t = {arrival.t:.6g} s"
+                f"warning: after a pause, or a leap of a clock, of {arrival.t - before:.3f} s time goes on "
+                f"from t = {arrival.t:.3f} s"
             )
         for scan in arrival.refuted:
             self._scans += 1
             if self._scans <= MOST_TOLD:
                 self._warn(
-                    f"warning: passed over, sensor {scan.sensor!r} gave the time {scan.t:.6g} s, which no "
+                    f"warning: passed over, sensor {scan.sensor!r} gave the time {scan.t:.3f} s, which no "
                     "other scan confirms"
                 )
 
@@ -105,7 +105,7 @@ class Told:
             if due is not None:
                 self._warn(
                     f"warning: {place}none of the last {due.count} scans of sensor {name!r} has been taken: "
-                    f"the time {t:.6g} s {_where(t, arrival.t)}"
+                    f"the time {t:.3f} s {_where(t, arrival.t)}"
                 )
 
     def _first(self, number: int, text: str) -> None:
@@ -118,7 +118,7 @@ class Told:
 def _where(t: float, now: float) -> str:
     if t == now:
         return "comes again and again"
-    return f"is {abs(t - now):.6g} s {'after' if t > now else 'before'} the newest, {now:.6g} s"
+    return f"is {abs(t - now):.3f} s {'after' if t > now else 'before'} the newest, {now:.3f} s"
 
 
 class BadLines:

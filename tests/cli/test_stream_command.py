@@ -356,7 +356,7 @@ def test_a_sensor_that_falls_silent_is_named_on_both_outputs(monkeypatch, capsys
         ("sensor-back", "rgb"),
     ]
     assert events[0]["t"] == pytest.approx(1.96, abs=0.011)
-    assert "sensor 'rgb' has given no scan since t = 0.95 s" in err
+    assert "sensor 'rgb' has given no scan since t = 0.950 s" in err
 
 
 def test_late_scans_are_passed_over_if_asked(monkeypatch, capsys):

@@ -318,7 +318,7 @@ def test_stream_finds_it_and_the_record_has_it(tmp_path, monkeypatch, capsys):
 def test_a_service_shows_the_clock_of_each_sensor():
     status = Status("gantry7", 10.0)
     lived = Lived(both(0.15, "true")[:1300])
-    status.came([scan for _, scan in sensor("rgb", seconds=1.0) + sensor("evt", seconds=1.0)])
+    status.came([scan for _, scan in sensor("rgb", seconds=1.0) + sensor("evt", seconds=1.0)], ["rgb", "evt"])
     status.clocks = lived.live.clocks
     shown = status.health()["sensors"]
     assert shown["rgb"]["clock"] is None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -66,6 +67,16 @@ def test_no_payload_does_more_than_be_refused(payload):
     pytest.importorskip("msgpack", reason="MessagePack is not installed")
     with contextlib.suppress(DataError):
         decode_scans(payload, "topic", 1)
+
+
+@pytest.mark.parametrize(
+    "payload", [b"\x00garbage", b"\xff\xfe", b"hello", b"", b"\x81\xa1t\xcb?\xe0\0\0\0\0\0\0"]
+)
+def test_without_messagepack_what_is_no_json_is_refused_like_any_bad_message(payload, monkeypatch):
+    monkeypatch.setitem(sys.modules, "msgpack", None)
+    with pytest.raises(DataError, match=r"topic:1: is not JSON, and MessagePack needs .*'msgpack>=1\.1,<2'"):
+        decode_scans(payload, "topic", 1)
+    assert decoded(SCAN).batch.t == 0.5
 
 
 def test_tracks_say_which_message_they_answer():

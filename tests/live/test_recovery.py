@@ -334,8 +334,8 @@ def test_a_sensor_of_which_nothing_is_taken_is_named_again_and_again():
     assert len(answered) == 20 * 120
     told = [text for text in said if "none of the last" in text]
     assert told[0] == (
-        "warning: none of the last 100 scans of sensor 'evt' has been taken: the time 3604.95 s is "
-        "3600 s after the newest, 4.95 s"
+        "warning: none of the last 100 scans of sensor 'evt' has been taken: the time 3604.950 s is "
+        "3600.000 s after the newest, 4.950 s"
     )
     assert len(told) == 5
     for k in range(20 * 120, 20 * 121):
@@ -351,7 +351,7 @@ def test_messages_that_were_all_taken_before_are_told_of():
     assert len(answered) == 1000
     told = [text for text in said if "had been taken before" in text]
     assert told[0].startswith(
-        "warning: the last 100 messages had been taken before and are passed over, up to t = 4.95 s"
+        "warning: the last 100 messages had been taken before and are passed over, up to t = 4.950 s"
     )
     assert 3 <= len(told) <= 5
     assert session.duplicates == 1000

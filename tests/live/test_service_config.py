@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import socket
+import sys
 import warnings
 
 import numpy as np
@@ -100,7 +101,39 @@ def test_no_such_file(tmp_path, capsys):
     assert capsys.readouterr().err == f"jeat-graph serve: {tmp_path}/none.yaml: No such file or directory\n"
 
 
+@pytest.mark.parametrize("options", [["--check"], []])
+@pytest.mark.parametrize(
+    ("text", "package", "named"),
+    [
+        ("sources: [{url: nats://127.0.0.1:1/t}]\nsinks: [{url: '-'}]", "nats", "'nats-py>=2.9,<3'"),
+        ("sources: [{url: mqtt://127.0.0.1:1/t}]\nsinks: [{url: '-'}]", "paho", "'paho-mqtt>=2.1,<3'"),
+        ("sources: [{frames: rtsp://cam/t}]\nsinks: [{url: kafka+tls://h/t}]", "confluent_kafka", "kafka>="),
+        (
+            "sources: [{frames: rtsp://cam/t}]\nsinks: [{url: mqtt://127.0.0.1:1/t, encoding: msgpack}]",
+            "msgpack",
+            "'msgpack>=1.1,<2'",
+        ),
+    ],
+)
+def test_a_missing_client_ends_it_and_is_named(options, text, package, named, tmp_path, monkeypatch, capsys):
+    if package == "msgpack":
+        pytest.importorskip("paho.mqtt", reason="the client is not installed")
+    for name in [name for name in sys.modules if name.startswith("jeat_graph.live.transport.")]:
+        if name.rpartition(".")[2].startswith(("mqtt", "nats", "kafka")):
+            monkeypatch.delitem(sys.modules, name)
+    for name in [package, *(name for name in sys.modules if name.startswith(package + "."))]:
+        monkeypatch.setitem(sys.modules, name, None)
+    path = written(tmp_path, text + "\nweb: {port: 0}\n")
+    assert main(["serve", *options, str(path)]) == 2
+    said = capsys.readouterr().err
+    assert "needs a package more: pip install" in said
+    assert named in said
+    assert said.count("\n") == 1
+
+
 def test_a_password_that_others_may_read_is_warned_of_and_not_shown(tmp_path, capsys):
+    pytest.importorskip("paho.mqtt", reason="the client is not installed")
+    pytest.importorskip("nats", reason="the client is not installed")
     path = written(tmp_path, GOOD.replace("rtsp://cam/road", "rtsp://u:canary@cam/road"))
     path.chmod(0o644)
     assert main(["serve", "--check", str(path)]) == 0
@@ -197,11 +230,11 @@ def test_all_sensors_may_fall_silent_and_each_is_named_once(monkeypatch):
     monkeypatch.setattr("jeat_graph.live.service.status.time.monotonic", lambda: now[0])
     status = Status("gate", silent_s=10.0)
     scan = {name: Scan(1.0, name, np.zeros((0, 4)), np.zeros(0)) for name in ("rgb", "evt")}
-    status.came(scan.values())
+    status.came(scan.values(), scan)
     now[0] = 109.0
     assert status.changes_of_silence() == []
     now[0] = 112.0
     assert status.changes_of_silence() == [("rgb", 12.0), ("evt", 12.0)]
     assert status.changes_of_silence() == []
-    status.came([scan["evt"]])
+    status.came([scan["evt"]], ["evt"])
     assert status.changes_of_silence() == [("evt", None)]

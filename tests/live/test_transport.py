@@ -85,11 +85,10 @@ def test_what_was_not_committed_comes_again_in_order_and_what_was_does_not(url):
 
 
 def test_a_sender_waits_for_a_slow_receiver_or_the_broker_holds_the_rest(url):
-    source = open_source(url)
-    most = min(source.most_open, 100)
-    if most == 100:
-        source.close()
+    if url.startswith("kafka"):
         pytest.skip("the broker's log is the buffer: nothing is pushed")
+    most = 50  # more than the 20 of Mosquitto's max_inflight_messages
+    source = open_source(f"{url}?most={most}")
     send(url, numbered(3 * most))
     assert receive(source, most, commit_every=10**9) == numbered(most)
     assert source.receive(0.5) is None  # no more until they are committed

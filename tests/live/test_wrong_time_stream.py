@@ -52,7 +52,7 @@ def test_one_message_of_two_sensors_with_a_wrong_time_changes_nothing(stream, ju
     assert found == right
     assert len(right) == 240
     assert (tmp_path / "found.csv").read_bytes() == (tmp_path / "right.csv").read_bytes()
-    assert f"gave the time {2.0 + jump_s:.6g} s, which no other scan confirms" in complaint
+    assert f"gave the time {2.0 + jump_s:.3f} s, which no other scan confirms" in complaint
 
 
 @pytest.mark.parametrize(("count", "lost"), [(1, 0), (3, 3), (40, 100)])

@@ -13,11 +13,20 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.capture.back_off import BackOff
 from jeat_graph.io.streams.track_lines import json_line
 from jeat_graph.live.health import HealthChange
-from jeat_graph.live.messages import ScanMessage, encode_tracks
+from jeat_graph.live.messages import ScanMessage, encode_tracks, msgpack_package
 from jeat_graph.live.service.config import STDOUT, ServiceConfig, full_url
 from jeat_graph.live.service.log import Log
 from jeat_graph.live.service.status import EndStatus, Status
-from jeat_graph.live.transport.ends import Sink, Source, open_sink, open_source, sink_address, source_address
+from jeat_graph.live.transport.address import scheme_of
+from jeat_graph.live.transport.ends import (
+    Sink,
+    Source,
+    check_client,
+    open_sink,
+    open_source,
+    sink_address,
+    source_address,
+)
 from jeat_graph.live.transport.notices import Notices
 from jeat_graph.live.transport.patience import Overdue
 
@@ -88,6 +97,20 @@ class Sinks:
         """Leave all of them."""
         for sink, _, _ in self._opened:
             sink.close()
+
+
+def check_packages(config: ServiceConfig) -> None:
+    """See that all is installed that the sources and sinks need; connects to nobody.
+
+    Raises:
+        ConfigError: a package is missing.
+    """
+    sinks = [one for one in config.sinks if one.url != STDOUT]
+    urls = [one.url for one in config.sources if one.url is not None] + [one.url for one in sinks]
+    for scheme in sorted({scheme_of(url) for url in urls}):
+        check_client(scheme)
+    if any(one.encoding == "msgpack" for one in sinks):
+        msgpack_package()
 
 
 def open_sinks(

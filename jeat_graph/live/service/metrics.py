@@ -66,7 +66,11 @@ class Metrics:
         aside: list[tuple[list[str], float]] = [([], float(len(status.set_aside)))]
         yield family(gauge, "checkpoints_set_aside", "that could not be gone on from at the start", aside)
         for name, value in health["messages"].items():
-            yield family(counter, name, f"messages or checkpoints {name.replace('_', ' ')}", [([], value)])
+            if name != "passed_over":  # scans, by sensor
+                text = f"messages or checkpoints {name.replace('_', ' ')}"
+                yield family(counter, name, text, [([], value)])
+        passed = [([sensor], float(count)) for sensor, count in status.passed_over.items()]
+        yield family(counter, "passed_over", "scans of a sensor passed over", passed, "sensor")
         yield family(counter, "dropped", "pictures dropped and scans passed over", [([], status.dropped)])
         sensors = health["sensors"].items()
         for name, key in (("scans", "scans"), ("boxes", "boxes")):

@@ -22,7 +22,7 @@ from jeat_graph.live.late import LiveTracker, check_saved
 from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.service.cameras import Cameras
 from jeat_graph.live.service.config import ServiceConfig
-from jeat_graph.live.service.ends import OpenedSource, Sinks, open_sinks, open_sources
+from jeat_graph.live.service.ends import OpenedSource, Sinks, check_packages, open_sinks, open_sources
 from jeat_graph.live.service.log import ERROR, INFO, WARNING, Log
 from jeat_graph.live.service.status import RUNNING, STOPPING, Status
 from jeat_graph.live.service.systemd import Watchdog, notify
@@ -35,8 +35,6 @@ from jeat_graph.tracking.tracker import Tracker
 
 #: Timeout of a receive (s): of the only source, and of one of several.
 _ALONE_S, _BESIDE_S = 0.2, 0.05
-#: A source is told what has been taken whenever it has nothing more, and after this part of what may be open.
-_COMMIT_PART = 0.5
 #: So many messages of one source are taken before the next one's turn.
 _IN_A_ROW = 16
 #: Exit codes: ended as asked; ended by trouble that a new start may mend.
@@ -77,7 +75,8 @@ class Service:
             0 after a signal, 1 after trouble that a new start may mend.
 
         Raises:
-            ConfigError: a file, a setting or an address that is not valid, or an old checkpoint.
+            ConfigError: a file, a setting or an address that is not valid, a package that is missing, or an
+                old checkpoint.
         """
         config, log, status = self._config, self._log, self.status
         with ExitStack() as stack:
@@ -86,7 +85,8 @@ class Service:
             for path in (config.state.checkpoint, config.state.smoothed):
                 if path is not None:
                     stack.enter_context(hold_file(path))
-            tracker = config.tracker  # what is wrong of these is known before anything is opened
+            check_packages(config)  # what is wrong of these is known before anything is opened
+            tracker = config.tracker
             settings = load_config(tracker.config, list(tracker.set), tracker.rig)
             if config.state.checkpoint is not None:
                 check_saved(Tracker(settings), "state.checkpoint")
@@ -279,23 +279,24 @@ class Service:
                 message = None
             if message is not None:
                 self._take(message, place, running)
-        if one.open and (payload is None or one.open >= _COMMIT_PART * one.source.most_open):
-            running.session.save()
+        running.session.save_in_turn(one.open, one.source.most_open, payload is None)
         return payload is not None
 
     def _take(self, message: ScanMessage, place: str, running: _Running) -> None:
         self._came = time.monotonic()
         session, counted = running.session, self.status.counted
         counted.taken += 1
-        before = session.duplicates
+        before, arrival = session.duplicates, None
         try:
-            session.accept(message, place)
+            arrival = session.accept(message, place)
         except MESSAGE_ERRORS as error:
             self._bad(of_message(error, place), running)
         counted.duplicates = session.duplicates
         if session.duplicates == before:
-            self.status.came(message.batch.scans)
+            kept = () if arrival is None else (*arrival.taken, *arrival.waiting)
+            self.status.came(message.batch.scans, {scan.sensor for scan in kept})
         counted.passed_over = session.live.lateness.dropped
+        self.status.passed_over = session.live.lateness.dropped_by_sensor()
         self.status.clocks = dict(session.live.clocks)
 
     def _bad(self, error: DataError, running: _Running) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -59,12 +59,14 @@ class SensorStatus:
     Attributes:
         t: time of its newest scan (s).
         seen: when that came (s, of `time.monotonic`).
+        taken: when the newest one that the tracker took came, or the first of all (s, of `time.monotonic`).
         scans: how many came.
         boxes: in them.
     """
 
     t: float
     seen: float
+    taken: float
     scans: int = 0
     boxes: int = 0
 
@@ -93,6 +95,7 @@ class Status:
         sinks: brokers that tracks go to.
         cameras: those that are looked at here.
         sensors: by name what has come of them.
+        passed_over: by sensor how many scans were passed over (`LatenessCounter.dropped_by_sensor`).
         clocks: by sensor what was found of its clock and is taken off its times (`LiveTracker.clocks`).
         counted: what is counted.
         lag_s: how long after its own time the newest scan was answered (s), or None.
@@ -110,6 +113,7 @@ class Status:
     sinks: list[EndStatus] = field(default_factory=list)
     cameras: list[LiveStatus] = field(default_factory=list)
     sensors: dict[str, SensorStatus] = field(default_factory=dict)
+    passed_over: Mapping[str, int] = field(default_factory=dict)
     clocks: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     counted: Counted = field(default_factory=Counted)
     lag_s: float | None = None
@@ -130,15 +134,18 @@ class Status:
         """For how long (s) the part that was quiet for longest has done nothing."""
         return time.monotonic() - min(self.beat, self.detectors_beat())
 
-    def came(self, scans: Iterable[Scan]) -> None:
-        """Note scans that have come."""
+    def came(self, scans: Iterable[Scan], taken: Collection[str]) -> None:
+        """Note scans that have come, and of which sensors the tracker took some or keeps some for later."""
         now = time.monotonic()
         with self._lock:
             for scan in scans:
-                one = self.sensors.setdefault(scan.sensor, SensorStatus(scan.t, now))
+                one = self.sensors.setdefault(scan.sensor, SensorStatus(scan.t, now, now))
                 one.t, one.seen = max(one.t, scan.t), now
                 one.scans += 1
                 one.boxes += len(scan)
+            for name in taken:
+                if name in self.sensors:
+                    self.sensors[name].taken = now
 
     def answered(self, t: float, tracks: int, processing_s: float) -> None:
         """Note an answer.
@@ -171,6 +178,11 @@ class Status:
         found += [
             f"sensor {name!r}: no scan for {silent_s:.0f} s" for name, silent_s in self._silent_for(now)
         ]
+        found += [
+            f"sensor {name!r}: none of its scans has been taken for {now - one.taken:.0f} s"
+            for name, one in self._copied().items()
+            if now - one.seen <= self.silent_s < now - one.taken
+        ]
         return found
 
     def changes_of_silence(self) -> list[tuple[str, float | None]]:
@@ -202,6 +214,8 @@ class Status:
                 name: {
                     "last_scan": one.t,
                     "age_s": round(now - one.seen, 3),
+                    "taken_age_s": round(now - one.taken, 3),
+                    "passed_over": self.passed_over.get(name, 0),
                     "scans": one.scans,
                     "boxes": one.boxes,
                     "clock": dict(self.clocks[name]) if name in self.clocks else None,

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import ipaddress
+from importlib import import_module
 from typing import Protocol
 
-from jeat_graph.data.errors import ConfigError, JeatGraphError
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.extras import install
 from jeat_graph.live.transport.address import Address, parse_address, scheme_of
 from jeat_graph.live.transport.notices import Notices, Tell, say_nothing
@@ -123,6 +124,21 @@ def check_addresses(source: str | None, sink: str | None) -> None:
         raise ConfigError(f"{one}: source and sink are both called client={client}; names must differ")
 
 
+def check_client(scheme: str) -> None:
+    """See that the client of a broker is installed; connects to nobody.
+
+    Args:
+        scheme: of the address: `mqtt`, `nats` or `kafka`.
+
+    Raises:
+        ConfigError: its package is missing.
+    """
+    try:
+        import_module(f"{__package__}.{scheme}")
+    except ImportError as error:
+        raise ConfigError(f"{scheme}:// needs a package more: {install(scheme)} ({error})") from None
+
+
 def open_source(
     url: str, overdue: Overdue = never, tell: Tell = say_nothing, notices: Notices | None = None
 ) -> Source:
@@ -135,26 +151,24 @@ def open_source(
         notices: takes them instead of `tell`, and knows whether there is a connection.
 
     Raises:
-        ConfigError: the address is not valid.
-        JeatGraphError: the client's package is missing, or nobody answers at the address.
+        ConfigError: the address is not valid, or the client's package is missing.
+        JeatGraphError: nobody answers at the address.
     """
     address = source_address(url)
     notices = notices or Notices(tell)
     _warn_of(address, notices)
-    try:
-        if address.scheme == "mqtt":
-            from jeat_graph.live.transport.mqtt import MqttSource
+    check_client(address.scheme)
+    if address.scheme == "mqtt":
+        from jeat_graph.live.transport.mqtt import MqttSource
 
-            return MqttSource(address, overdue, notices)
-        if address.scheme == "nats":
-            from jeat_graph.live.transport.nats import NatsSource
+        return MqttSource(address, overdue, notices)
+    if address.scheme == "nats":
+        from jeat_graph.live.transport.nats import NatsSource
 
-            return NatsSource(address, overdue, notices)
-        from jeat_graph.live.transport.kafka import KafkaSource
+        return NatsSource(address, overdue, notices)
+    from jeat_graph.live.transport.kafka import KafkaSource
 
-        return KafkaSource(address, overdue, notices)
-    except ImportError as error:
-        raise _missing(address.scheme, error) from None
+    return KafkaSource(address, overdue, notices)
 
 
 def open_sink(
@@ -169,26 +183,24 @@ def open_sink(
         notices: takes them instead of `tell`, and knows whether there is a connection.
 
     Raises:
-        ConfigError: the address is not valid.
-        JeatGraphError: the client's package is missing, or nobody answers at the address.
+        ConfigError: the address is not valid, or the client's package is missing.
+        JeatGraphError: nobody answers at the address.
     """
     address = sink_address(url)
     notices = notices or Notices(tell)
     _warn_of(address, notices)
-    try:
-        if address.scheme == "mqtt":
-            from jeat_graph.live.transport.mqtt import MqttSink
+    check_client(address.scheme)
+    if address.scheme == "mqtt":
+        from jeat_graph.live.transport.mqtt import MqttSink
 
-            return MqttSink(address, overdue, notices)
-        if address.scheme == "nats":
-            from jeat_graph.live.transport.nats import NatsSink
+        return MqttSink(address, overdue, notices)
+    if address.scheme == "nats":
+        from jeat_graph.live.transport.nats import NatsSink
 
-            return NatsSink(address, overdue, notices)
-        from jeat_graph.live.transport.kafka import KafkaSink
+        return NatsSink(address, overdue, notices)
+    from jeat_graph.live.transport.kafka import KafkaSink
 
-        return KafkaSink(address, overdue, notices)
-    except ImportError as error:
-        raise _missing(address.scheme, error) from None
+    return KafkaSink(address, overdue, notices)
 
 
 def _warn_of(address: Address, notices: Notices) -> None:
@@ -212,7 +224,3 @@ def _is_here(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def _missing(scheme: str, error: ImportError) -> JeatGraphError:
-    return JeatGraphError(f"{scheme}:// needs a package more: {install(scheme)} ({error})")

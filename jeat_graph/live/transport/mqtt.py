@@ -19,8 +19,12 @@ from jeat_graph.live.transport.topics import covers
 
 #: How long the broker keeps a session without a client (s): a day, for a machine that has to be mended.
 SESSION_S = 86_400
-#: Messages that may be on their way without an acknowledgement; Mosquitto by itself sends no more than 20.
-MOST_OPEN = 20
+#: Messages that may be open: Mosquitto sends so many to a client of MQTT 5 that asks for them.
+MOST_OPEN = 1000
+#: Answers that may be on their way: Mosquitto by itself takes no more than 20.
+_MOST_SENT = 20
+#: The number that is asked for has two bytes (`ReceiveMaximum`).
+_MOST_ASKED = 65_535
 _CONNECT_S = 10.0
 _QOS = 1
 #: Beside topic and payload a message has kind, length, length of topic, number, no properties (bytes).
@@ -48,7 +52,7 @@ class MqttSource:
     def __init__(self, address: Address, overdue: Overdue = never, notices: Notices | None = None) -> None:
         self.address, self._overdue = address, overdue
         self._notices = notices or Notices()
-        self.most_open = address.number("most", MOST_OPEN, low=1)
+        self.most_open = address.number("most", MOST_OPEN, low=1, high=_MOST_ASKED)
         self._waiting: queue.Queue[tuple[int, Any]] = queue.Queue()
         self._open: list[tuple[int, int]] = []
         self._settled = threading.Event()
@@ -161,7 +165,7 @@ class MqttSink:
     def __init__(self, address: Address, overdue: Overdue = never, notices: Notices | None = None) -> None:
         self.address, self._overdue = address, overdue
         self._notices = notices or Notices()
-        self._most = address.number("most", MOST_OPEN, low=1)
+        self._most = address.number("most", _MOST_SENT, low=1)
         self._head = _HEAD_BYTES + len(address.topic.encode())
         self._sent = self._confirmed = 0
         self._change = threading.Condition()
