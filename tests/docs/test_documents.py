@@ -10,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 from benchmarks.__main__ import build_parser as benchmarks_parser
 from jeat_graph.cli.main import COMMANDS, build_parser, main
@@ -61,6 +62,11 @@ PYTHON = [
     for page in PAGES
     for k, block in enumerate(blocks(page, "python"))
 ]
+YAML = [
+    pytest.param(block, id=f"{name(page)}-{k}")
+    for page in PAGES
+    for k, block in enumerate(blocks(page, "yaml"))
+]
 SHELL = [
     pytest.param(words, id=f"{name(page)}: {' '.join(words)}"[:90])
     for page in PAGES
@@ -73,6 +79,21 @@ SHELL = [
 def test_blocks_of_python_run(block, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     exec(compile(block, "block", "exec"), {"__name__": "block"})
+
+
+@pytest.mark.parametrize("block", YAML)
+def test_blocks_of_yaml_are_mappings_of_names(block):
+    found = yaml.safe_load(block)
+    assert isinstance(found, dict)
+    assert all(re.fullmatch(r"\w+", str(key)) for key in found)
+
+
+def test_the_rig_by_hand_is_understood(tmp_path):
+    path = tmp_path / "rig.yaml"
+    path.write_text(blocks(ROOT / "docs" / "guides" / "rigs.md", "yaml")[0], encoding="utf-8")
+    event_camera = load_config("default", rig=str(path)).sensors["evt"]
+    assert event_camera.image == (640, 360)
+    assert (event_camera.clock.offset_s, event_camera.clock.drift_ppm) == (0.15, 12.0)
 
 
 def test_the_readme_tracks_a_vehicle_in_a_few_lines(capsys):

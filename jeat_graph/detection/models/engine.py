@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -108,5 +109,11 @@ class _OpenCv:
         return {name: np.asarray(value) for name, value in zip(self._names, found, strict=True)}
 
 
+#: What OpenCV says before and after the reason: version, file, line and code; the function.
+_AROUND = re.compile(r"^OpenCV\(\S*\) .*?: error: \(.*?\) | in function '[^']*'$")
+_SENTENCE = re.compile(r"(?<=\w{2})\. (?=[A-Z])")
+
+
 def _short(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]
+    """Return the first sentence of what an engine says."""
+    return _SENTENCE.split(_AROUND.sub("", " ".join(str(error).split())))[0]

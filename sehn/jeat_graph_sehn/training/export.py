@@ -70,6 +70,7 @@ def write_onnx(
         )
     model = onnx.load_from_string(buffer.getvalue())
     share_weights(model)
+    spread_summands(model)
     halve_weights(model)
     if second_look:
         card = {**card, SECOND_LOOK: True}
@@ -94,6 +95,37 @@ def share_weights(model: Any) -> None:
     used = [tensor for tensor in graph.initializer if tensor.name in taken]
     del graph.initializer[:]
     graph.initializer.extend(used)
+
+
+def spread_summands(model: Any) -> None:
+    """Bring what is added to a convolution's output to its shape, where it has fewer cells.
+
+    OpenCV 5 joins a convolution and a sum behind it into one layer, which cannot repeat the other summand.
+
+    Args:
+        model: as ONNX has it, its inputs of fixed shapes; changed.
+    """
+    from onnx import helper, numpy_helper, shape_inference
+
+    inferred = shape_inference.infer_shapes(model, data_prop=True).graph
+    shapes = {
+        value.name: [one.dim_value for one in value.type.tensor_type.shape.dim]
+        for value in (*inferred.input, *inferred.value_info, *inferred.output)
+    }
+    graph, nodes = model.graph, []
+    convolved = {node.output[0] for node in graph.node if node.op_type == "Conv"}
+    for node in graph.node:
+        if node.op_type == "Add" and len(convolved.intersection(node.input)) == 1:
+            at = int(node.input[0] in convolved)
+            whole, part = shapes.get(node.input[1 - at], []), shapes.get(node.input[at], [])
+            if any(few == 1 < many for few, many in zip(part, whole, strict=False)):
+                shape, spread = f"{node.output[0]}_shape", f"{node.output[0]}_spread"
+                graph.initializer.append(numpy_helper.from_array(np.array(whole, dtype=np.int64), shape))
+                nodes.append(helper.make_node("Expand", [node.input[at], shape], [spread]))
+                node.input[at] = spread
+        nodes.append(node)
+    del graph.node[:]
+    graph.node.extend(nodes)
 
 
 def halve_weights(model: Any, *, only_exact: bool = False) -> None:

@@ -14,7 +14,7 @@ from jeat_graph.detection.models.model_settings import ModelSettings  # noqa: E4
 from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
 from jeat_graph.detection.models.pictures import ModelPictureDetector  # noqa: E402
 from jeat_graph.detection.settings import EventSettings  # noqa: E402
-from jeat_graph_sehn.training.export import write_onnx  # noqa: E402
+from jeat_graph_sehn.training.export import spread_summands, write_onnx  # noqa: E402
 from jeat_graph_sehn.training.network import DetectionNet  # noqa: E402
 from jeat_graph_sehn.training.serving import ServedNet  # noqa: E402
 from jeat_graph_sehn.training.settings import NetSettings  # noqa: E402
@@ -94,3 +94,45 @@ def test_the_file_is_recognised_and_runs(pair, engine):
         )
     assert "classes vehicle" in detector.description
     assert len(scan.boxes) > 0
+
+
+def summed(summand_shape):
+    """A convolution to which the same is added at each cell."""
+    onnx = pytest.importorskip("onnx", reason="pip install onnx")
+    helper, numpy_helper = onnx.helper, onnx.numpy_helper
+    weights = np.random.default_rng(2).normal(size=(16, 16, 1, 1)).astype(np.float32)
+    kind = onnx.TensorProto.FLOAT
+    graph = helper.make_graph(
+        [
+            helper.make_node("Neg", ["minus_b"], ["b"]),
+            helper.make_node("Conv", ["x", "w"], ["c"]),
+            helper.make_node("Add", ["c", "b"], ["y"]),
+        ],
+        "net",
+        [
+            helper.make_tensor_value_info("x", kind, [1, 16, 6, 10]),
+            helper.make_tensor_value_info("minus_b", kind, summand_shape),
+        ],
+        [helper.make_tensor_value_info("y", kind, [1, 16, 6, 10])],
+        [numpy_helper.from_array(weights, "w")],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    return model, weights[:, :, 0, 0]
+
+
+def test_opencv_adds_what_is_the_same_at_each_cell(tmp_path):
+    model, weights = summed([1, 16, 1, 1])
+    spread_summands(model)
+    path = tmp_path / "net.onnx"
+    path.write_bytes(model.SerializeToString())
+    rng = np.random.default_rng(1)
+    x, b = (rng.normal(size=shape).astype(np.float32) for shape in ((1, 16, 6, 10), (1, 16, 1, 1)))
+    found = open_engine(path, read_onnx_head(path), "opencv", 1).run({"x": x, "minus_b": -b})["y"]
+    np.testing.assert_allclose(found, np.einsum("oi,bihw->bohw", weights, x) + b, rtol=1e-5, atol=1e-5)
+
+
+def test_summands_of_the_same_shape_stay_as_they_are():
+    model, _ = summed([1, 16, 6, 10])
+    before = model.SerializeToString(deterministic=True)
+    spread_summands(model)
+    assert model.SerializeToString(deterministic=True) == before
