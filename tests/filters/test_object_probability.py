@@ -139,7 +139,7 @@ def test_a_coincidence_is_no_testimony_of_a_blind_sensor():
     once = evidence_of([60.0, 0.02], [1.0, 60.0], [2.5, -1.0], gained=30.0, stood=1.0)
     before, after = (op.posterior(one, sensors, C).log_odds[0] for one in (silent, once))
     assert before > 0.5
-    # Counted in full, its score and the sensor's prior would cost 1.7. What is left: evt may have invented it.
+    # In full, its score and the prior of the sensor would cost 1.7. What is left: evt may have invented it.
     assert before - 0.3 < after < before
 
 
