@@ -11,6 +11,7 @@ import hashlib
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
+from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -72,7 +73,7 @@ def _code() -> str:
 def write_kept(detections: Detections, path: Path) -> None:
     """Write detections as they are, without rounding."""
     values = {one.name: getattr(detections, one.name) for one in fields(detections)}
-    arrays = {name: np.array(value) for name, value in values.items() if value is not None}
+    arrays: dict[str, Any] = {name: np.array(value) for name, value in values.items() if value is not None}
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.savez(file, **arrays)

@@ -114,8 +114,12 @@ def count_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.ND
         name: np.array([row[name] for row in rows], dtype=np.str_) for name in text
     }
     for name in ("t_start", "t_end", "observed", "count", "per_hour", *_SPEEDS):
-        values = np.array([row[name] for row in rows], dtype=np.int64 if name == "count" else np.float64)
-        columns[name] = values if name == "count" else round_decimals(values, decimals[name])
+        values = [row[name] for row in rows]
+        columns[name] = (
+            np.array(values, dtype=np.int64)
+            if name == "count"
+            else round_decimals(np.array(values, dtype=np.float64), decimals[name])
+        )
     return columns
 
 
