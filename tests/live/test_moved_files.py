@@ -56,7 +56,7 @@ class Run:
 
 @pytest.fixture
 def whole(tmp_path):
-    """The bytes of a run whose file nobody touches."""
+    """The smoothed file, as bytes, of a run in which it is not moved."""
     (tmp_path / "whole").mkdir()
     run = Run(tmp_path / "whole")
     run.take(0, MESSAGES)

@@ -155,9 +155,7 @@ def open_source(
         JeatGraphError: nobody answers at the address.
     """
     address = source_address(url)
-    notices = notices or Notices(tell)
-    _warn_of(address, notices)
-    check_client(address.scheme)
+    notices = _before_opening(address, notices or Notices(tell))
     if address.scheme == "mqtt":
         from jeat_graph.live.transport.mqtt import MqttSource
 
@@ -187,9 +185,7 @@ def open_sink(
         JeatGraphError: nobody answers at the address.
     """
     address = sink_address(url)
-    notices = notices or Notices(tell)
-    _warn_of(address, notices)
-    check_client(address.scheme)
+    notices = _before_opening(address, notices or Notices(tell))
     if address.scheme == "mqtt":
         from jeat_graph.live.transport.mqtt import MqttSink
 
@@ -201,6 +197,13 @@ def open_sink(
     from jeat_graph.live.transport.kafka import KafkaSink
 
     return KafkaSink(address, overdue, notices)
+
+
+def _before_opening(address: Address, notices: Notices) -> Notices:
+    """Warn of a connection that is not secure, and check that the client's package is there."""
+    _warn_of(address, notices)
+    check_client(address.scheme)
+    return notices
 
 
 def _warn_of(address: Address, notices: Notices) -> None:
