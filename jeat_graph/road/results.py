@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -167,6 +168,7 @@ def speed_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
     """Rows of `speeds.csv`, one a vehicle."""
     numbers = {
         "length": [size.mean[0] for size in result.sizes],
+        "sigma_length": [math.sqrt(size.var[0]) for size in result.sizes],
         "speed_kmh": [s.kmh for s in result.speeds],
         "low_kmh": [s.low_kmh for s in result.speeds],
         "high_kmh": [s.high_kmh for s in result.speeds],
@@ -174,6 +176,7 @@ def speed_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
         "sigma_calibration_kmh": [s.calibration_kmh for s in result.speeds],
     }
     rounded = {name: round_decimals(np.array(v, dtype=np.float64), _DECIMALS) for name, v in numbers.items()}
+    sigma_length = rounded.pop("sigma_length")
     return {
         "track_id": np.array([v.track_id for v in result.vehicles], dtype=np.int64),
         "t_first": np.array([v.t[0] for v in result.vehicles], dtype=np.float64),
@@ -182,6 +185,7 @@ def speed_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
         "class": np.array(result.classes, dtype=np.str_),
         **rounded,
         "parked": np.array(result.parked, dtype=np.int64),
+        "sigma_length": sigma_length,
     }
 
 
@@ -199,6 +203,8 @@ def crossing_columns(result: RoadResult) -> dict[str, npt.NDArray[Any]]:
         values = np.array([getattr(row[2].speed, field) for row in rows], dtype=np.float64)
         columns[name] = round_decimals(values, _DECIMALS)
     columns["direction"] = np.array([row[2].direction for row in rows], dtype=np.str_)
+    sigma = np.array([row[2].sigma_t for row in rows], dtype=np.float64)
+    columns["sigma_t"] = round_significant(np.where(np.isfinite(sigma), sigma, np.nan), _DIGITS)
     return columns
 
 

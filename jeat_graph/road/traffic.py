@@ -12,12 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.fields import LARGEST, check, number
-from jeat_graph.data.arrays import FloatArray
 from jeat_graph.eval.counting import interval_edges, observed_s
 from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.results import RoadResult
-from jeat_graph.road.speeds import KMH, Z95, Vehicle
+from jeat_graph.road.speeds import KMH, Z95
 
 ALL = "all"
 
@@ -225,7 +224,7 @@ def _headway(result: RoadResult, ahead: Passage, behind: Passage) -> dict[str, A
     known = math.isfinite(length[0]) and math.isfinite(length[1])
     half = [size / 2.0 / v if known else 0.0 for size, v in zip(length, speed, strict=True)]
     headway = (behind.crossing.t - half[1]) - (ahead.crossing.t - half[0])
-    variance = _time_variance(first, ahead.crossing.t) + _time_variance(second, behind.crossing.t)
+    variance = ahead.crossing.sigma_t**2 + behind.crossing.sigma_t**2
     if known:
         variance += sum((s / 2.0 / v) ** 2 for s, v in zip(spread, speed, strict=True))
     gap = headway - length[0] / speed[0] if known else math.nan
@@ -246,14 +245,3 @@ def _headway(result: RoadResult, ahead: Passage, behind: Passage) -> dict[str, A
         reach = Z95 * math.sqrt(var)
         out |= {name: value, f"{name}_low": value - reach, f"{name}_high": value + reach}
     return out
-
-
-def _time_variance(vehicle: Vehicle, t: float) -> float:
-    """Variance of the time (s²) at which a vehicle is where it is at t, by its own noise."""
-    velocity: FloatArray = vehicle.fit.at(np.array(t), 1)
-    size = float(np.linalg.norm(velocity))
-    if size < 1e-3:
-        return math.inf
-    row = vehicle.fit.basis(np.array(t))
-    gradient = np.concatenate([velocity[0] * row, velocity[1] * row]) / size**2
-    return float(gradient @ vehicle.fit.covariance @ gradient)

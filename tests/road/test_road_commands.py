@@ -85,6 +85,7 @@ def test_from_points_to_speeds(
     assert list(speeds[0]) == [
         *("track_id", "t_first", "t_last", "lane", "class", "length"),
         *("speed_kmh", "low_kmh", "high_kmh", "sigma_noise_kmh", "sigma_calibration_kmh", "parked"),
+        "sigma_length",
     ]
     errors = [float(row["speed_kmh"]) - 3.6 * true[int(row["track_id"])] for row in speeds]
     assert np.abs(errors).mean() < 0.9
@@ -93,6 +94,7 @@ def test_from_points_to_speeds(
     assert {row["lane"] for row in speeds} == {"1", "2"}
     crossings = _rows(out / "crossings.csv")
     assert {row["line"] for row in crossings} == {"a", "b"}
+    assert all(0.0 < float(row["sigma_t"]) < 0.1 for row in crossings)
     states = _rows(out / "road.csv")
     assert all(float(row["var_x"]) > 0 and float(row["var_speed_kmh"]) > 0 for row in states[::50])
     main([*args, "--out", str(folder / "again")])

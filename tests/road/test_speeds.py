@@ -240,3 +240,19 @@ def test_all_of_many_vehicles_are_unbiased() -> None:
             vehicle = _one(t[rows], pixels[rows])
             errors.append(vehicle.mean_speed(*vehicle.fit.window()).kmh - 3.6 * true[k])
     assert abs(np.mean(errors)) < 0.15
+
+
+def test_the_error_of_a_crossing_time_is_what_it_says() -> None:
+    """Errors drawn from the model: the times at a slanting line scatter as `sigma_t` says (200 draws)."""
+    rng, cam = np.random.default_rng(5), camera()
+    t = np.arange(0.0, 1.2, 0.04)
+    root = np.linalg.cholesky(error_covariance(t, MOTION, np.ones(len(t))))
+    ends = np.array([[-10.0, 25.0], [20.0, 35.0]])
+    true = (44.0 - (25.0 + 14.0 / 3.0)) / 22.0
+    pixels = see(cam, np.c_[np.full(len(t), 4.0), 44.0 - 22.0 * t])
+    z = []
+    for _ in range(200):
+        found = crossing(_one(t, pixels + root @ rng.standard_normal((len(t), 2))), ends)
+        assert found is not None
+        z.append((found.t - true) / found.sigma_t)
+    assert 0.85 < np.std(z) < 1.15  # three standard deviations of that of 200 draws
