@@ -44,6 +44,7 @@ from jeat_graph.tracking.updates import Updates
 _MOST_SENSORS = 63
 #: Greatest absolute value of ln of what looks say of a pair.
 _MOST_ALIKE = 4.0
+_NO_BOXES: IntArray = np.zeros(0, dtype=np.int64)
 _FINISHED = "this tracker has been finished; make another one for another recording"
 
 
@@ -123,7 +124,7 @@ class ModelTracker(Updates, SavedModel):
         self._called: list[str] = []  # names of classes by number
         self._looks: Looks | None = None
         self._causal: Trajectories | None = None
-        self._order: IntArray = np.zeros(0, dtype=np.int64)
+        self._order: IntArray = _NO_BOXES
         self._boxes = StepBoxes.none()
         self._finished = False
 
@@ -254,7 +255,8 @@ class ModelTracker(Updates, SavedModel):
         """
         if self.time is not None:
             self._model.begin_anew(t)
-            self._causal = None
+            # The model has no last step now, so there are no boxes of one either.
+            self._order, self._boxes, self._causal = _NO_BOXES, StepBoxes.none(), None
 
     def number_on_from(self, identity: int) -> None:
         """Give no track that begins from now on an identity below this."""

@@ -184,7 +184,8 @@ class PaperTracker(Updates):
         if self._t is not None:
             if self._smoothers is not None:
                 self._smoothers.begin_anew()
-            self._tracks, self._t = self._tracks.take(np.zeros(0, dtype=np.int64)), t
+            nothing = np.zeros(0, dtype=np.int64)
+            self._tracks, self._taker, self._t = self._tracks.take(nothing), nothing, t
 
     def number_on_from(self, identity: int) -> None:
         """Give no track that begins from now on an identity below this."""
