@@ -57,7 +57,7 @@ def track(
     from jeat_graph.tracking.tracker import Tracker
 
     recording = recording_of(detections, {**options, "image": image})
-    recording, settings, _ = in_common(recording, _settings(config, image, detections))
+    recording, settings, _ = in_common(recording, _settings(_told(config, detections), image, detections))
     recording, _, said = find_clocks(recording, settings, "the detections")
     for line in said:
         warnings.warn(line, InputWarning, stacklevel=2)
@@ -71,12 +71,24 @@ def track(
     return Tracks(causal, tracker.finish() if wanted else None)
 
 
+def _told(config: Config | PathLike, recording: object) -> Config | PathLike:
+    """Return the configuration `default` with what a table says of its detectors; another as it is."""
+    from jeat_graph.config.reading import load_config
+    from jeat_graph.io.tables.sensor_columns import as_settings, said_by, said_by_frame
+    from jeat_graph.runs.track_files import TOLD_CONFIG
+
+    if config != TOLD_CONFIG or isinstance(recording, Detections):
+        return config
+    said = said_by(recording) if isinstance(recording, (str, Path)) else said_by_frame(recording)
+    return load_config(TOLD_CONFIG, as_settings(said))
+
+
 def _settings(config: Config | PathLike, image: tuple[float, float] | None, *recordings: object) -> Config:
     """Return a configuration with the picture's size as it is given, or as a file beside recordings says."""
     from jeat_graph.runs.beside import facts_beside, with_picture
 
-    found = as_config(config, image)
     files = [one for one in recordings if isinstance(one, (str, Path))]
+    found = as_config(config, image)
     said = image is not None or (isinstance(config, Config) and found.input.picture == "given")
     if said or not files:
         return found

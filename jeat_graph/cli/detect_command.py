@@ -58,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Detect, and write the file."""
+    from jeat_graph.detection.declared import known_of
     from jeat_graph.detection.live_detecting import is_live_request
     from jeat_graph.io.files.atomic import check_writable
     from jeat_graph.io.files.outputs import check_keeps
@@ -72,8 +73,8 @@ def run(args: argparse.Namespace) -> int:
     if not is_live_request(request):
         check_keeps(request.files, out)
     check_writable(out)
-    found = detect_with_bar(request, "detect")
-    write_detections(found, out)
+    found, request = _found(request)
+    write_detections(found, out, said=known_of(request, partial(say, "detect")))
     boxes = np.diff(found.scan_start)
     for k, name in enumerate(found.sensors):
         of_sensor = found.scan_sensor == k
@@ -83,6 +84,19 @@ def run(args: argparse.Namespace) -> int:
         print("classes:", ", ".join(f"{name} {n}" for name, n in zip(names, count, strict=True)) or "none")
     print(f"wrote {out}")
     return 0
+
+
+def _found(request: DetectRequest) -> tuple[Detections, DetectRequest]:
+    """Return what was found, and the request with the detectors that looked."""
+    from jeat_graph.detection.automatic import resolved
+    from jeat_graph.detection.live_detecting import is_live_request
+
+    if not is_live_request(request):
+        request = resolved(request, partial(say, "detect"))
+        return detect_with_bar(request, "detect"), request
+    looked: list[DetectRequest] = []
+    found = _detect_with_clock(request, partial(say, "detect"), lambda one, _: looked.append(one))
+    return found, looked[0]
 
 
 def _to_stdout(request: DetectRequest) -> int:
@@ -113,16 +127,13 @@ def _write_lines(scans: Iterable[Scan]) -> None:
 
 
 def detect_with_bar(request: DetectRequest, command: str) -> Detections:
-    """Detect, and show on a terminal how far it has come."""
+    """Detect in recordings, and show on a terminal how far it has come."""
     from tqdm import tqdm
 
     from jeat_graph.detection.detecting import detect_files
-    from jeat_graph.detection.live_detecting import is_live_request
 
     tell = partial(say, command)
     hidden = not sys.stderr.isatty()
-    if is_live_request(request):
-        return _detect_with_clock(request, tell, hidden)
     if request.frames is not None:
         form = "{desc}: {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
         with (
@@ -150,9 +161,13 @@ def _time_shown(hidden: bool) -> Iterator[Callable[[float], None]]:
         yield on_time
 
 
-def _detect_with_clock(request: DetectRequest, tell: Callable[[str], object], hidden: bool) -> Detections:
+def _detect_with_clock(
+    request: DetectRequest,
+    tell: Callable[[str], object],
+    prepared: Callable[[DetectRequest, tuple[int, int]], object],
+) -> Detections:
     """Detect in cameras that are on until Ctrl-C, or as long as is asked for."""
     from jeat_graph.detection.live_detecting import detect_live, live_detections
 
-    with _time_shown(hidden) as on_time, until_interrupted() as until:
-        return live_detections(detect_live(request, tell, on_time, until), request)
+    with _time_shown(not sys.stderr.isatty()) as on_time, until_interrupted() as until:
+        return live_detections(detect_live(request, tell, on_time, until, prepared), request)

@@ -115,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
         declared = tuple(made_by(args, _say))
     else:
         found = _detected(args)
-        detections, declared, detectors = (found.path,), found.declared, found.detectors
+        detections, declared, detectors = (found.path,), (), found.detectors
         if args.frames is not None and is_live(args.frames):
             args.frames = None  # there is nothing more to be learnt of it
         args.classes = None  # the networks have looked for no others

@@ -132,14 +132,22 @@ def tree_of_changes(changes: Sequence[str]) -> dict[str, Any]:
 def parse_change(text: str) -> tuple[list[str], Any]:
     """Return the path of keys and the value of a text `section.key=value`, the value as YAML.
 
+    A key in double quotes may hold dots and signs of equality: `sensors."cam 7.1".even_score=0.5`.
+
     Raises:
         ConfigError: no key, no `=`, or a value that is not YAML.
     """
     key, equals, value = text.partition("=")
+    quoted = _QUOTED.match(text)
+    if quoted is not None:
+        before, name, key, value = quoted.groups()
+        steps = [*before.split(".")[:-1], name, *key.strip().split(".")]
+    else:
+        steps = key.strip().split(".")
     if not equals or not key.strip():
         raise ConfigError(f"{text!r}: must read section.key=value")
     try:
-        return key.strip().split("."), load_yaml(value)
+        return steps, load_yaml(value)
     except yaml.YAMLError as error:
         raise ConfigError(f"{text!r}: not valid YAML: {getattr(error, 'problem', None) or error}") from None
 
@@ -238,6 +246,8 @@ def plain(value: Any) -> Any:
 
 
 _MOST_BASES = 50
+# `section."name".key=value`
+_QUOTED = re.compile(r'\s*((?:[^".=]+\.)*)"([^"]+)"\.([^=]*)=(.*)', re.DOTALL)
 _MOST_SHOWN = 80  # characters of a value in a message
 _EXPONENT = r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+"
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from jeat_graph.data.detections import Detections
 from jeat_graph.detection.automatic import resolved
-from jeat_graph.detection.declared import declared_settings
+from jeat_graph.detection.declared import known_of
 from jeat_graph.detection.detecting import detect_files, picture_of
 from jeat_graph.detection.live_detecting import detect_live, live_detections
 from jeat_graph.detection.request import DetectRequest
@@ -18,17 +18,15 @@ DETECTIONS = "detections.csv"
 
 
 class DetectedFile(NamedTuple):
-    """A file of detections, and what the tracker is told of it.
+    """A file of detections; what is known of the networks that made it stands in it (`sensor_columns`).
 
     Attributes:
         path: the file.
-        declared: `key=value` settings of the networks that made it.
         image: width and height of the picture (px), where only the events tell it.
         detectors: what made it, `sensor: name`.
     """
 
     path: str
-    declared: tuple[str, ...]
     image: tuple[int, int] | None
     detectors: tuple[str, ...] = ()
 
@@ -37,7 +35,7 @@ def detect_before(
     request: DetectRequest,
     out: Path,
     *,
-    declare: bool,
+    declare: bool = True,
     say: Callable[[str], object] = lambda _: None,
     detect: Callable[[DetectRequest], Detections] | None = None,
 ) -> DetectedFile:
@@ -46,7 +44,7 @@ def detect_before(
     Args:
         request: what to look for, and where.
         out: the run directory.
-        declare: whether the tracker is told what is known of the networks, as `default` is.
+        declare: whether the tracker takes what is known of the networks, as `default` does: then it is said.
         say: called with each thing that was found out.
         detect: looks; by default `detect_files`.
 
@@ -58,19 +56,20 @@ def detect_before(
     from jeat_graph.io.tables.detections_io import write_detections
 
     request = resolved(request, say)
-    declared = declared_settings(request, say) if declare else []
+    known = known_of(request, say if declare else lambda _: None)
     image = picture_of(request)
     found = out / DETECTIONS
     with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
-        write_detections(detect_files(request, say) if detect is None else detect(request), found)
-    return DetectedFile(str(found), tuple(declared), image, request.detectors)
+        detections = detect_files(request, say) if detect is None else detect(request)
+        write_detections(detections, found, said=known)
+    return DetectedFile(str(found), image, request.detectors)
 
 
 def detect_live_before(
     request: DetectRequest,
     out: Path,
     *,
-    declare: bool,
+    declare: bool = True,
     say: Callable[[str], object] = lambda _: None,
     until: Callable[[], bool] = lambda: False,
 ) -> DetectedFile:
@@ -85,7 +84,7 @@ def detect_live_before(
     known: list[tuple[DetectRequest, tuple[int, int]]] = []
     with hold_made_folder(out):
         scans = detect_live(request, say, until=until, prepared=lambda *what: known.append(what))
-        write_detections(live_detections(scans, request), found)
-    [(looked, size_px)] = known
-    declared = declared_settings(looked, say) if declare else []
-    return DetectedFile(str(found), tuple(declared), size_px, looked.detectors)
+        detections = live_detections(scans, request)
+        [(looked, size_px)] = known
+        write_detections(detections, found, said=known_of(looked, say if declare else lambda _: None))
+    return DetectedFile(str(found), size_px, looked.detectors)

@@ -21,6 +21,7 @@ from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.detection.models.output_reader import layout_of
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.request import DetectRequest
+from jeat_graph.io.tables.sensor_columns import Said
 
 _SUFFIX = ".tracking.yaml"
 #: Sides of a picture: batch, colours, height, width.
@@ -33,8 +34,8 @@ class _Declared:
     sensor: SensorConfig = field(default_factory=SensorConfig)
 
 
-def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:
-    """Return what is known of the networks that detect, as `key=value` settings of the tracker.
+def known_of(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> Said:
+    """Return what is known of the networks that detect, as settings of the tracker by sensor and key.
 
     Detectors without weights say nothing.
 
@@ -52,7 +53,12 @@ def declared_settings(request: DetectRequest, say: Callable[[str], object] = lam
     if request.detector_fused is not None:
         looking = {FUSED_SENSOR: request.detector_fused}
     networks = {sensor: by for sensor, by in looking.items() if by is not None}
-    return declared_of(networks, say, request.settings.model_frames)
+    return known_of_networks(networks, say, request.settings.model_frames)
+
+
+def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:
+    """Return the same as `key=value` texts; args and errors as of `known_of`."""
+    return [f"sensors.{sensor}={json.dumps(keys)}" for sensor, keys in known_of(request, say).items()]
 
 
 def declared_of(
@@ -60,6 +66,16 @@ def declared_of(
     say: Callable[[str], object] = lambda _: None,
     reading: ModelSettings | None = None,
 ) -> list[str]:
+    """Return the same of detectors whose boxes come from elsewhere; args and errors as of the next."""
+    known = known_of_networks(detectors, say, reading)
+    return [f"sensors.{sensor}={json.dumps(keys)}" for sensor, keys in known.items()]
+
+
+def known_of_networks(
+    detectors: Mapping[str, str],
+    say: Callable[[str], object] = lambda _: None,
+    reading: ModelSettings | None = None,
+) -> Said:
     """Return the same of detectors whose boxes come from elsewhere, from a file or a pipe.
 
     Args:
@@ -70,7 +86,7 @@ def declared_of(
     Raises:
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
     """
-    found: list[str] = []
+    found: Said = {}
     for sensor, detector in detectors.items():
         if detector == MOTION:
             continue
@@ -78,34 +94,37 @@ def declared_of(
         beside = network.with_name(network.name.removesuffix(network.suffix) + _SUFFIX)
         if not beside.is_file():
             if _KINDS[sensor] == FRAMES:
-                found += _by_layout(sensor, network, reading or ModelSettings(), say)
+                even = _even_by_layout(sensor, network, reading or ModelSettings(), say)
+                found |= {} if even is None else {sensor: {"even_score": even}}
             continue
         tree = read_tree(str(beside), (), str, "file of what a network's boxes are like")
         try:
             build(_Declared, tree, "")
         except ConfigError as error:
             raise ConfigError(f"{beside}: {error}") from None
-        found.append(f"sensors.{sensor}={json.dumps(tree.get('sensor', {}))}")
+        found[sensor] = dict(tree.get("sensor") or {})
         say(f"sensor {sensor!r}: its boxes are taken for what {beside.name} says (any other --config: not)")
     return found
 
 
-def _by_layout(sensor: str, network: Path, reading: ModelSettings, say: Callable[[str], object]) -> list[str]:
-    """Return what scores of a foreign network of pictures mean; nothing where that is not known."""
+def _even_by_layout(
+    sensor: str, network: Path, reading: ModelSettings, say: Callable[[str], object]
+) -> float | None:
+    """Return the even score of a foreign network of pictures; None where that is not known."""
     try:
         head = read_onnx_head(network)
         if CARD in head.notes:
-            return []
+            return None
         picture = next((port.shape for port in head.inputs if len(port.shape) == _PICTURE), None)
         height, width = (None, None) if picture is None else picture[2:]
         open_width, open_height = reading.open_side
         side = (width or open_width, height or open_height)
         layout = layout_of(head.outputs, side, head.notes, reading.layout, network)
     except DataError:  # who detects says what is wrong with it
-        return []
+        return None
     even = reading.even_score(layout)
     say(
         f"sensor {sensor!r}: a box of score {even:g} is taken to be as likely real as not, as of the layout "
         f"{layout} (--set sensors.{sensor}.even_score=… says otherwise; any other --config: not)"
     )
-    return [f"sensors.{sensor}={json.dumps({'even_score': even})}"]
+    return even

@@ -14,7 +14,6 @@ from jeat_graph.version import __version__
 
 #: Beside the detections: what they were made from, and what the tracker is told; written last.
 SOURCE = "detected.json"
-_DEFAULT = "default"
 
 
 def with_detections(request: TrackRequest, raw: DetectRequest) -> TrackRequest:
@@ -30,19 +29,19 @@ def with_detections(request: TrackRequest, raw: DetectRequest) -> TrackRequest:
     from jeat_graph.io.files.atomic import open_atomic
 
     out = Path(request.out)
-    origin = _origin(raw, request.config)
+    origin = _origin(raw)
     found = _known(out, origin)
     if found is None:
         (out / SOURCE).unlink(missing_ok=True)
-        found = detect_before(raw, out, declare=request.config == _DEFAULT)
+        found = detect_before(raw, out)
         with open_atomic(out / SOURCE) as file:
-            known = {"declared": found.declared, "image": found.image, "detectors": found.detectors}
+            known = {"image": found.image, "detectors": found.detectors}
             json.dump(origin | known, file)
     picture: tuple[str, ...] = ()
     if found.image is not None:
         picture = (f"image.width={found.image[0]}", f"image.height={found.image[1]}")
     frames = None if raw.frames is None else str(raw.frames)
-    overrides = (*found.declared, *picture, *request.overrides)
+    overrides = (*picture, *request.overrides)
     return replace(
         request,
         detections=(found.path,),
@@ -52,7 +51,7 @@ def with_detections(request: TrackRequest, raw: DetectRequest) -> TrackRequest:
     )
 
 
-def _origin(raw: DetectRequest, config: str) -> dict[str, Any]:
+def _origin(raw: DetectRequest) -> dict[str, Any]:
     """Return what detections depend on: the files by their content, and all settings."""
     from jeat_graph.io.files.hashing import sha256_of
 
@@ -68,7 +67,6 @@ def _origin(raw: DetectRequest, config: str) -> dict[str, Any]:
         "inputs": [sha256_of(path) for path in raw.files],
         "networks": networks,
         "settings": repr(settings),
-        "config": config,
     }
 
 
@@ -83,7 +81,6 @@ def _known(out: Path, origin: dict[str, Any]) -> DetectedFile | None:
             return None
         image = known["image"]
         size = None if image is None else (int(image[0]), int(image[1]))
-        declared, detectors = (tuple(map(str, known[key])) for key in ("declared", "detectors"))
-        return DetectedFile(str(file), declared, size, detectors)
+        return DetectedFile(str(file), size, tuple(map(str, known["detectors"])))
     except (ValueError, KeyError, TypeError, RecursionError):
         return None  # damaged: it is made anew

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,10 @@ from jeat_graph.runs.tracking_run import write_run
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
+    from jeat_graph.io.tables.sensor_columns import Said
+
+#: The configuration that takes what tables say of their detectors.
+TOLD_CONFIG = "default"
 
 
 @dataclass(frozen=True)
@@ -81,8 +85,21 @@ class TrackRequest:
             return self, facts
         return replace(self, rate_hz=facts.rate_hz), facts
 
+    def said(self) -> Said:
+        """Return what the detections' own tables say of their detectors (`sensor_columns`).
+
+        Another configuration than `default`, a preset or the user's own, says itself what its sensors are.
+
+        Raises:
+            DataError: a table cannot be read, or says two things of one sensor.
+        """
+        from jeat_graph.io.tables.detections_io import split_name
+        from jeat_graph.io.tables.sensor_columns import said_by_all
+
+        return said_by_all(map(split_name, self.detections)) if self.config == TOLD_CONFIG else {}
+
     def configured(self) -> tuple[Config, list[str]]:
-        """Load the configuration, with the picture's size from files beside the detections.
+        """Load the configuration, with what the detections say, and what files beside them say.
 
         Returns:
             The configuration, and a line for each thing that was found out.
@@ -92,11 +109,19 @@ class TrackRequest:
             DataError: a file cannot be read.
         """
         from jeat_graph.config.reading import load_config
+        from jeat_graph.io.tables.sensor_columns import as_settings
 
-        config = load_config(self.config, self.overrides, self.rig)
+        said = self.said()
+        notes = [
+            f"sensor {name!r}: {_words(keys)}, as the detections say (--set sensors.{name}.… otherwise)"
+            for name, keys in said.items()
+            if not self.detectors  # what has just detected has said it
+        ]
+        config = load_config(self.config, [*as_settings(said), *self.overrides], self.rig)
         if self.rig is not None and config.input.picture == "given":
-            return config, []  # the frames are one sensor's picture
-        return with_picture(config, self.overrides, self.with_facts()[1])
+            return config, notes  # the frames are one sensor's picture
+        config, more = with_picture(config, self.overrides, self.with_facts()[1])
+        return config, [*notes, *more]
 
     def load_config(self) -> Config:
         """Return the configuration as `configured` does, alone."""
@@ -134,6 +159,10 @@ class TrackRequest:
             "time_unit": self.time_unit,
             **{name: value for name, value in more.items() if value is not None},
         }
+
+
+def _words(keys: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in keys.items())
 
 
 def track_files(

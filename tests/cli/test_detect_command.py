@@ -180,6 +180,13 @@ def test_track_takes_a_networks_boxes_for_what_is_known_of_them(tmp_path, raw, m
         used[name] = json.loads((tmp_path / name / "run.json").read_text())["config"]["sensors"]["rgb"]
         assert ("sehn-frames.tracking.yaml" in capsys.readouterr().err) == (name != "paper")
     known = load_config("default", declared_of({"rgb": "sehn"})).sensors["rgb"]
+    again = tmp_path / "again"
+    assert (
+        main(["track", str(tmp_path / "plain" / "detections.csv"), "--image", "320x200", "--out", str(again)])
+        == 0
+    )
+    for table in ("causal.csv", "smoothed.csv"):  # a table knows as much as who has just detected
+        assert (again / table).read_bytes() == (tmp_path / "plain" / table).read_bytes()
     assert used["plain"]["even_score"] == known.even_score is not None
     assert used["set"]["even_score"] == 0.7
     assert used["set"]["rate_hz"] == used["plain"]["rate_hz"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
@@ -27,6 +27,7 @@ from jeat_graph.io.tables.detection_rows import assemble
 from jeat_graph.io.tables.file_tables import read_table
 from jeat_graph.io.tables.formats import counts_frames, known_columns, recognise
 from jeat_graph.io.tables.rounding import round_decimals
+from jeat_graph.io.tables.sensor_columns import columns_of
 from jeat_graph.io.tables.table_writer import write_columns
 
 _COLUMNS = ("t", "sensor", *BOX, "score")
@@ -50,7 +51,8 @@ def read_detections(
     csv, parquet  `t, sensor, left, top, width, height[, score, class]`, rows in any order; a row with only
                   `t` and `sensor` is an empty scan. Usual other names are understood, see `column_names`;
                   other columns are passed over. `;` or tabs between fields, `.csv.gz`. A table that counts
-                  frames may lack `sensor`.
+                  frames may lack `sensor`. Columns `sensor.KEY` say what is known of the detector; `track`
+                  reads them, see `sensor_columns`.
     motchallenge  `frame, id, left, top, width, height, conf, …`; rate from `rate_hz` or `seqinfo.ini`. Also
                   in a zip that CVAT takes or gives (`MOT 1.1`).
     kitti         tracking labels (17 columns) or results (18), frames from 0; 10 Hz unless `rate_hz` says so.
@@ -170,15 +172,24 @@ def split_name(item: str | Path) -> tuple[str | None, str | Path]:
     return match[1], match[2]
 
 
-def write_detections(detections: Detections, path: str | Path, decimals: int | None = None) -> None:
+def write_detections(
+    detections: Detections,
+    path: str | Path,
+    decimals: int | None = None,
+    said: Mapping[str, Mapping[str, Any]] | None = None,
+) -> None:
     """Write detections as CSV, or as Parquet where the name ends so; empty scans are rows without a box.
 
     Args:
         detections: what to write.
         path: the file; it appears only when it is complete.
         decimals: decimals (px) to which boxes are rounded; by default every number is kept to the last bit.
+        said: what is known of the detector of each sensor, by the keys of `sensors.NAME`; `track` reads it
+            back (`sensor_columns`).
     """
     columns = detections.columns()
+    if said:
+        columns |= columns_of(said, columns["sensor"])
     if decimals is not None:
         columns |= {name: round_decimals(columns[name], decimals) for name in BOX}
     write_columns(columns, path)
