@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import webbrowser
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,11 +58,13 @@ def run(args: argparse.Namespace) -> int:
         if path.suffix.lower() not in suffixes:
             raise DataError(f"must end in {' or '.join(suffixes)}", path)
     picture = _picture(args)
-    with DrawServer(picture, Path(args.source).name, marks, lengths, args.port) as server:
+    tell = partial(say, "draw")
+    with DrawServer(picture, Path(args.source).name, marks, lengths, args.port, tell) as server:
         print(f"draw at {server.address}", flush=True)
-        if not args.no_browser and not webbrowser.open(server.address):
-            say("draw", "no browser could be started: open the address in one")
-        server.run()
+        with contextlib.ExitStack() as stack:
+            if not args.no_browser and not webbrowser.open(stack.enter_context(server.way_in())):
+                tell("no browser could be started: open the address in one")
+            server.run()
     print(", ".join(f"wrote {path}" for path in (marks, lengths) if path.is_file()) or "nothing was drawn")
     return 0
 

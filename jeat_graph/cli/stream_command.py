@@ -146,10 +146,12 @@ def _run(args: argparse.Namespace, cameras: LiveDetecting | None) -> int:
         source, sink = _ends(args, stack, interrupts)
         smoothed = None
         if args.smoothed is not None:
-            smoothed = stack.enter_context(SmoothedFile(args.smoothed, more.get("smoothed")))
-        output = StreamOutput(args.format, args.encoding, sink)
+            smoothed = stack.enter_context(
+                SmoothedFile(args.smoothed, more.get("smoothed"), interrupts.overdue)
+            )
+        output = StreamOutput(args.format, args.encoding, sink, interrupts.overdue)
         ends = Ends(
-            tracks=_with_road(output.tracks, live, args, stack),
+            tracks=_with_road(output.tracks, live, args, stack, interrupts),
             event=output.event,
             warn=_say,
             smoothed=smoothed,
@@ -236,6 +238,7 @@ def _with_road(
     live: LiveTracker,
     args: argparse.Namespace,
     stack: contextlib.ExitStack,
+    interrupts: Interrupts,
 ) -> Callable[[float, Trajectories, ScanMessage, float], object]:
     """Have each answer taken in by the vehicles' motion on the road too, if that is wanted."""
     if args.road is None:
@@ -244,7 +247,7 @@ def _with_road(
     from jeat_graph.road.lag_table import RoadFile, RoadLagTable
 
     table = RoadLagTable(read_camera(args.camera), live.tracker.config.smoother.lag_s)
-    road = stack.enter_context(RoadFile(args.road, table))
+    road = stack.enter_context(RoadFile(args.road, table, interrupts.overdue))
 
     def both(t: float, table: Trajectories, message: ScanMessage, late_s: float) -> None:
         tracks(t, table, message, late_s)

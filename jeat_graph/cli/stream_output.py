@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING
+
+from jeat_graph.live.stdout_lines import StdoutLines
+from jeat_graph.live.transport.patience import Overdue, never
 
 if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
@@ -15,12 +17,19 @@ if TYPE_CHECKING:
 class StreamOutput:
     """Tracks to stdout, each line flushed at once, or as messages to a broker.
 
+    Args:
+        form: `json` or `csv`, of stdout.
+        encoding: of messages to a broker.
+        sink: the broker; None for stdout.
+        overdue: tells whether the program is to end.
+
     Attributes:
         seq: number of the next message to a broker.
     """
 
-    def __init__(self, form: str, encoding: str, sink: Sink | None) -> None:
+    def __init__(self, form: str, encoding: str, sink: Sink | None, overdue: Overdue = never) -> None:
         self.seq = 0
+        self._say = StdoutLines(overdue).write
         self._encoding, self._sink = encoding, sink
         self._csv = form == "csv"
         self._classes: bool | None = None  # whether the rows of CSV have them
@@ -62,7 +71,3 @@ class StreamOutput:
         """Wait until the broker has all."""
         if self._sink is not None:
             self._sink.flush()
-
-    def _say(self, text: str) -> None:
-        sys.stdout.write(text)
-        sys.stdout.flush()

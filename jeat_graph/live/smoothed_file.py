@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Self
 
 from jeat_graph.data.errors import DataError, InputWarning
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.files.growing import GrowingFile
+from jeat_graph.io.files.pipe_writer import never
 from jeat_graph.io.streams.track_lines import csv_header, csv_rows
 
 _HEADS = tuple(csv_header(classes).encode() for classes in (False, True))
@@ -26,13 +28,16 @@ class SmoothedFile:
         path: the file; replaced, or with `keep_bytes` gone on with.
         keep_bytes: how many bytes of it to keep, from a checkpoint; what came after them comes again. If it
             has no rows now, it was moved away since: a new one begins, with a warning.
+        over: of a pipe, tells whether the program is to end and its reader is not waited for any longer.
 
     Raises:
         DataError: it is a folder, or has rows, but is shorter than what is to be kept.
     """
 
-    def __init__(self, path: str | Path, keep_bytes: int | None = None) -> None:
-        self._path = Path(path)
+    def __init__(
+        self, path: str | Path, keep_bytes: int | None = None, over: Callable[[], bool] = never
+    ) -> None:
+        self._path, self._over = Path(path), over
         if self._path.is_dir():
             raise DataError("is a folder; --smoothed must name a file", path)
         self._keep = keep_bytes or 0
@@ -54,7 +59,7 @@ class SmoothedFile:
         if self._keep:  # one without a header has nothing to be kept
             with self._path.open("rb") as file:
                 head = file.readline()
-        self._file = GrowingFile(self._path, self._keep)
+        self._file = GrowingFile(self._path, self._keep, self._over)
         if head:
             self.begin(head == _HEADS[True])
         return self

@@ -5,7 +5,7 @@ What `track` writes with `smoother.road=fixed-lag`, and `stream` while vehicles 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.files.growing import GrowingFile
+from jeat_graph.io.files.pipe_writer import never
 from jeat_graph.io.tables.table_writer import csv_lines
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.causal import CalibrationShare, columns_of_rows
@@ -77,20 +78,21 @@ class RoadFile:
     Args:
         path: the file, which is replaced; where it is moved away, a new one begins.
         table: gives the rows.
+        over: of a pipe, tells whether the program is to end and its reader is not waited for any longer.
 
     Raises:
         DataError: it is a folder.
     """
 
-    def __init__(self, path: str | Path, table: RoadLagTable) -> None:
-        self._path, self._table = Path(path), table
+    def __init__(self, path: str | Path, table: RoadLagTable, over: Callable[[], bool] = never) -> None:
+        self._path, self._table, self._over = Path(path), table, over
         self._reported: set[int] = set()
         self._look_again_at = _FEW
         if self._path.is_dir():
             raise DataError("is a folder; --road must name a file", path)
 
     def __enter__(self) -> Self:
-        self._file = GrowingFile(self._path)
+        self._file = GrowingFile(self._path, over=self._over)
         self._file.begin((",".join(empty_road_columns()) + "\n").encode())
         return self
 

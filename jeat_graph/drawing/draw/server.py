@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import html
-import http.server
 import json
+import os
 import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.drawing.draw.drawn import Page, as_page, save_page
 from jeat_graph.io.media.pictures import as_png
 from jeat_graph.io.media.video import RgbImage
+from jeat_graph.io.streams.web_server import WebHandler, WebServer
 
 _HOME = "127.0.0.1"
 _LARGEST = 1 << 20
@@ -26,7 +29,7 @@ _JSON, _HTML, _PNG, _TEXT = (
 )
 
 
-class DrawServer(http.server.ThreadingHTTPServer):
+class DrawServer(WebServer):
     """A page over one picture.
 
     Its address holds a secret word, and other host names are refused, so that no other page in the browser
@@ -38,6 +41,7 @@ class DrawServer(http.server.ThreadingHTTPServer):
         marks: file of lines, zones and masks.
         lengths: file of lengths.
         port: of this machine; 0 takes a free one.
+        tell: takes a line of what could not be answered.
 
     Attributes:
         address: of the page.
@@ -47,9 +51,15 @@ class DrawServer(http.server.ThreadingHTTPServer):
         DataError: a file cannot be read, or the port is taken.
     """
 
-    daemon_threads = True
-
-    def __init__(self, picture: RgbImage, title: str, marks: Path, lengths: Path, port: int = 0) -> None:
+    def __init__(
+        self,
+        picture: RgbImage,
+        title: str,
+        marks: Path,
+        lengths: Path,
+        port: int = 0,
+        tell: Callable[[str], object] = lambda _: None,
+    ) -> None:
         self.files = marks, lengths
         self.page: Page = as_page(marks, lengths)
         word = secrets.token_urlsafe(16)
@@ -63,12 +73,35 @@ class DrawServer(http.server.ThreadingHTTPServer):
         self.prefix = f"/{word}/"
         self.done = False
         try:
-            super().__init__((_HOME, port), _Handler)
+            super().__init__(_HOME, port, _Handler, tell)
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or "ports are 0 to 65535"
             raise DataError(f"port {port} cannot be opened: {reason}") from None
         self.hosts = {f"{name}:{self.server_port}" for name in (_HOME, "localhost")}
         self.address = f"http://{_HOME}:{self.server_port}{self.prefix}"
+
+    @contextmanager
+    def way_in(self) -> Iterator[str]:
+        """Have a file there that leads a browser to the page: its own address, which may be shown.
+
+        The address of the page does not go onto a command line, where every user of the machine would see
+        its secret word; only the file's owner can read it.
+
+        Raises:
+            DataError: it cannot be written beside the marks.
+        """
+        path = self.files[0].resolve().parent / f"draw-{secrets.token_hex(4)}.html"
+        text = f'<!doctype html><meta http-equiv="refresh" content="0; url={html.escape(self.address)}">\n'
+        try:
+            handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(text)
+        except OSError as error:
+            raise DataError(f"cannot be written: {error.strerror}", path) from None
+        try:
+            yield path.as_uri()
+        finally:
+            path.unlink(missing_ok=True)
 
     def run(self) -> None:
         """Serve until the page says that it is done."""
@@ -77,11 +110,11 @@ class DrawServer(http.server.ThreadingHTTPServer):
             self.handle_request()
 
 
-class _Handler(http.server.BaseHTTPRequestHandler):
+class _Handler(WebHandler):
     server: DrawServer
     timeout = 10.0
 
-    def do_GET(self) -> None:
+    def get(self) -> None:
         """Give the page, its picture, or what is drawn already."""
         if not self._from_here():
             return
@@ -94,7 +127,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         else:
             self._answer(*found)
 
-    def do_POST(self) -> None:
+    def post(self) -> None:
         """Save what was drawn; `done` ends the server too."""
         ends = {f"{self.server.prefix}{name}": name == "done" for name in ("save", "done")}
         if not self._from_here():
@@ -109,8 +142,10 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             self._answer(_TEXT, " ".join(str(error).split()).encode(), HTTPStatus.BAD_REQUEST)
             return
         self.server.page = page
-        self._answer(_TEXT, said.encode())
-        self.server.done = ends[self.path]
+        try:
+            self._answer(_TEXT, said.encode())
+        finally:  # it is saved, whether or not the browser waited for the answer
+            self.server.done = ends[self.path]
 
     def _length(self) -> int:
         length = int(self.headers.get("Content-Length", "0"))
@@ -125,13 +160,5 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         return False
 
     def _answer(self, kind: str, content: bytes, status: HTTPStatus = HTTPStatus.OK) -> None:
-        self.send_response(status)
-        self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(content)))
-        self.send_header("Cache-Control", "no-store")
-        self.send_header("X-Content-Type-Options", "nosniff")
-        self.end_headers()
-        self.wfile.write(content)
-
-    def log_message(self, *_: object) -> None:
-        """Say nothing of requests."""
+        headers = {"Cache-Control": "no-store", "X-Content-Type-Options": "nosniff"}
+        self.answer(status, kind, content, headers)

@@ -1,4 +1,4 @@
-"""Files that grow by whole lines for months, and may be moved away meanwhile (logrotate).
+"""Files that grow by whole lines for months, and may be moved away meanwhile (logrotate); or pipes.
 
 A file that was moved away keeps what it has; the next lines begin a new file under the old name. One that was
 emptied in its place (`copytruncate`) begins anew, too. Both begin with the same head.
@@ -8,8 +8,11 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
+
+from jeat_graph.io.files.pipe_writer import PipeWriter, is_pipe, never
 
 
 class GrowingFile:
@@ -18,18 +21,22 @@ class GrowingFile:
     Args:
         path: the file; its folder is made if it is missing.
         keep_bytes: how much of it to keep; the rest is cut off.
+        over: of a pipe, tells whether the program is to end and its reader is not waited for any longer.
     """
 
-    def __init__(self, path: str | Path, keep_bytes: int = 0) -> None:
+    def __init__(self, path: str | Path, keep_bytes: int = 0, over: Callable[[], bool] = never) -> None:
         self._path = Path(path)
         self._head = b""
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = self._opened()
         # A pipe or a device is what it is: it can neither be cut nor be emptied.
-        self._is_file = stat.S_ISREG(os.fstat(self._file.fileno()).st_mode)
+        self._pipe = PipeWriter(path, over) if is_pipe(path) else None
+        self._is_file = False
+        self._size = keep_bytes
+        if self._pipe is None:
+            self._file = self._opened()
+            self._is_file = stat.S_ISREG(os.fstat(self._file.fileno()).st_mode)
         if self._is_file:
             self._file.truncate(keep_bytes)
-        self._size = keep_bytes
 
     def begin(self, head: bytes) -> None:
         """Say how each file begins, and write that if this one is empty."""
@@ -57,7 +64,7 @@ class GrowingFile:
 
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        (self._pipe or self._file).close()
 
     def _is_moved(self) -> bool:
         try:
@@ -70,6 +77,9 @@ class GrowingFile:
         return self._path.open("ab")
 
     def _write(self, data: bytes) -> None:
-        self._file.write(data)
-        self._file.flush()
+        if self._pipe is not None:
+            self._pipe.write(data)
+        else:
+            self._file.write(data)
+            self._file.flush()
         self._size += len(data)

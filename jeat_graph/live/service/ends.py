@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -17,6 +16,7 @@ from jeat_graph.live.messages import ScanMessage, encode_tracks, msgpack_package
 from jeat_graph.live.service.config import STDOUT, ServiceConfig, full_url
 from jeat_graph.live.service.log import Log
 from jeat_graph.live.service.status import EndStatus, Status
+from jeat_graph.live.stdout_lines import StdoutLines
 from jeat_graph.live.transport.address import scheme_of
 from jeat_graph.live.transport.ends import (
     Sink,
@@ -57,15 +57,15 @@ class Sinks:
         self.seq = 0
         self._status = status
         self._opened: list[tuple[Sink, str, EndStatus]] = []
-        self._stdout = False
+        self._stdout: StdoutLines | None = None
 
     def add(self, sink: Sink, encoding: str, status: EndStatus) -> None:
         """Send tracks there, too."""
         self._opened.append((sink, encoding, status))
 
-    def add_stdout(self) -> None:
+    def add_stdout(self, overdue: Overdue) -> None:
         """Write tracks to standard output, too."""
-        self._stdout = True
+        self._stdout = StdoutLines(overdue)
 
     def send(self, t: float, table: Trajectories, message: ScanMessage) -> None:
         """Give out the tracks after an arrival."""
@@ -79,9 +79,9 @@ class Sinks:
         for sink, encoding, status in self._opened:
             sink.send(encode_tracks(line, self.seq, message, encoding))
             status.messages += 1
-        if self._stdout:
-            sys.stdout.write(encode_tracks(line, self.seq, message, "json").decode().rstrip("\n") + "\n")
-            sys.stdout.flush()
+        if self._stdout is not None:
+            text = encode_tracks(line, self.seq, message, "json").decode()
+            self._stdout.write(text.rstrip("\n") + "\n")
         self.seq += 1
 
     def flush(self) -> None:
@@ -120,7 +120,7 @@ def open_sinks(
     sinks = Sinks(status)
     for one in config.sinks:
         if one.url == STDOUT:
-            sinks.add_stdout()
+            sinks.add_stdout(overdue)
             continue
         url = full_url(one.url, one.password_file, one.tls)
         end = EndStatus(str(sink_address(url)), Notices(log.say))

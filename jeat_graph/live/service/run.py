@@ -92,7 +92,7 @@ class Service:
                 check_saved(Tracker(settings), "state.checkpoint")
             self._saved_tracker(None)
             if config.web.port:
-                web = stack.enter_context(Web(config.web.host, config.web.port, status))
+                web = stack.enter_context(Web(config.web.host, config.web.port, status, log.say))
                 log.write(INFO, f"/health and /metrics at http://{config.web.host}:{web.port}")
             stack.enter_context(Watchdog(status.quiet_s))
             stack.callback(notify, "STOPPING=1")
@@ -221,7 +221,7 @@ class Service:
         """The file of smoothed rows; one that is not gone on with is renamed, never overwritten."""
         try:
             if keep_bytes is not None or not has_rows(path):
-                return SmoothedFile(path, keep_bytes)
+                return SmoothedFile(path, keep_bytes, self._overdue)
             why = f"{path}: is of a run that is not gone on from"
         except DataError as error:
             if not has_rows(path):  # a folder, say
@@ -229,7 +229,7 @@ class Service:
             why = str(error)
         aside = set_aside(path, "earlier")
         self._log.say(f"warning: {why}; it is {aside} now, and rows go into a new file")
-        return SmoothedFile(path)
+        return SmoothedFile(path, None, self._overdue)
 
     def _answering(self, sinks: Sinks) -> Any:
         status = self.status

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import http.client
 import json
+import socket
+import struct
 import threading
 import time
+from contextlib import closing
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 import cv2
 import numpy as np
@@ -148,6 +151,37 @@ def test_nobody_else_reaches_the_page(server, files):
     # A form of another page can send no JSON.
     assert ask(server, "POST", f"{server.prefix}save", json.dumps(PAGE), Content_Type="text/plain")[0] == 404
     assert not files[0].exists()
+
+
+def test_the_browser_is_led_to_the_page_by_a_file_of_its_owner(server, files):
+    """Command lines are seen by every user of a machine: the secret word stands on none."""
+    with server.way_in() as address:
+        path = Path(unquote(urlsplit(address).path))
+        assert server.prefix not in address
+        assert path.stat().st_mode & 0o077 == 0
+        assert f"url={server.address}" in path.read_text()
+    assert not path.exists()
+
+
+def test_a_browser_that_goes_early_leaves_no_trace_and_still_ends_it(server, files, capfd):
+    at = urlsplit(server.address)
+    body = json.dumps(PAGE).encode()
+    head = f"POST {server.prefix}done HTTP/1.1\r\nHost: {at.netloc}\r\nContent-Type: application/json\r\n"
+    for path in ("picture.png", ""):
+        with closing(socket.create_connection((at.hostname, at.port))) as link:
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+            link.sendall(f"GET {server.prefix}{path} HTTP/1.1\r\nHost: {at.netloc}\r\n\r\n".encode())
+    with closing(socket.create_connection((at.hostname, at.port))) as link:
+        link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        link.sendall(f"{head}Content-Length: {len(body)}\r\n\r\n".encode() + body)
+        assert soon(lambda: files[0].is_file())
+    assert soon(lambda: server.done)
+    assert capfd.readouterr().err == ""
+
+
+def test_head_is_get_without_content(server):
+    status, content = ask(server, "HEAD", f"{server.prefix}picture.png")
+    assert (status, content) == (200, b"")
 
 
 @pytest.mark.parametrize("body", ["", "nonsense", "[" * 100_000, '{"lines": 1}', "[]"])
