@@ -19,7 +19,7 @@ TECHNICAL = {
     "most_perspective": "bounds the growth in a step for which the transition is linearised",
     "fastest_growth": "bounds a power that would grow without limit",
     "first_period_s": "stands for the period of a sensor until its second scan",
-    "gap_prior_least_s": "keeps a prior finite in the shortest bin",
+    "gap_prior_least": "keeps a prior finite in the shortest bin",
     "learn_period_s": "how often parameters are computed anew: a question of cost",
     "unknown_score": "stands for a score that a detector does not give",
 }

@@ -50,7 +50,7 @@ _NEARBY = 8
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.epilog = (
-        "example: python -m benchmarks constants RECORDINGS --only jerk gap_prior_s --cache counts.jsonl"
+        "example: python -m benchmarks constants RECORDINGS --only jerk gap_prior --cache counts.jsonl"
     )
     common.declare(parser, _NAME, {"seeds": "of the random starts (0)"})
     add = parser.add_argument

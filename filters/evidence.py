@@ -43,6 +43,7 @@ class Evidence(ArrayTable):
         owner: (N,) index of the sensor that found it first.
         born_s, last_s: (N,) times of the first and the last detection (s).
         confirmed_s: (N,) time of the last detection that tells that it is still there (s).
+        missed: (N,) detections that were to be expected since then.
     """
 
     PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
@@ -69,6 +70,7 @@ class Evidence(ArrayTable):
     born_s: FloatArray
     last_s: FloatArray
     confirmed_s: FloatArray
+    missed: FloatArray
 
     def __len__(self) -> int:
         return len(self.owner)
@@ -80,7 +82,7 @@ class Evidence(ArrayTable):
         whole, truth = np.zeros(0, dtype=np.int64), np.zeros((0, sensors), dtype=np.bool_)
         logits = per_sensor, per_sensor, per_sensor, per_sensor, per_sensor
         counts = per_sensor, per_sensor, per_sensor, per_sensor
-        return cls(*counts, truth, *logits, one, one, one, whole, one, one, one)
+        return cls(*counts, truth, *logits, one, one, one, whole, one, one, one, one)
 
     @classmethod
     def of_births(
@@ -123,6 +125,7 @@ class Evidence(ArrayTable):
             born_s=time,
             last_s=time.copy(),
             confirmed_s=time.copy(),
+            missed=np.zeros(number),
         )
 
 
@@ -175,8 +178,24 @@ def count_hits(evidence: Evidence, hits: Hits, sensor: int, clock: ScanClock, c:
     new.gained[rows] += np.minimum(gain, c.most_gain)
     new.detections[rows] += 1.0
     new.last_s[rows] = clock.t
-    new.confirmed_s[rows[confirms]] = clock.t
+    new.confirmed_s[rows[confirms]], new.missed[rows[confirms]] = clock.t, 0.0
     return new
+
+
+def expect_hits(
+    evidence: Evidence, p_detect: FloatArray, sees: FloatArray, clock: ScanClock, c: ModelConstants
+) -> Evidence:
+    """Return the evidence as it is if a look finds nothing: the detections that were to be expected add up.
+
+    Args:
+        evidence: before.
+        p_detect: (N,) P_D of the sensor for each track.
+        sees: (N,) probability that it is not blind to the track.
+        clock: of the look; looks closer together than `full_look_s` are not one each.
+        c: constants.
+    """
+    expected = p_detect * sees * min(1.0, clock.period_s / c.full_look_s)
+    return replace(evidence, missed=evidence.missed + expected)
 
 
 def count_misses(

@@ -104,9 +104,10 @@ class ModelConstants:
         indifference_bounds: of z.
         visible_to_hidden, hidden_to_visible, visible_to_gone, hidden_to_gone: rates of the chain of presence
         (1/s).
-        gap_prior_s: a gap of length u ends well with exp(−u / this). Prior.
+        full_look_s: a sensor whose looks are closer together than this expects less of each (s).
+        gap_prior: a gap of u expected detections ends well with exp(−u / this). Prior.
         gap_prior_count: gaps that the prior counts for.
-        gap_prior_least_s: shortest u of the prior (s).
+        gap_prior_least: shortest u of the prior.
         gap_overlap: IoU with the predicted box from which on a gap ended well.
         sure: posterior at the end of a track from which on it tells what the track has been all along.
         longest_gap_s: a track that nobody has seen for so long ends (s).
@@ -224,9 +225,10 @@ class ModelConstants:
     hidden_to_visible: float = 2.0
     visible_to_gone: float = 0.1
     hidden_to_gone: float = 0.3
-    gap_prior_s: float = 0.3
+    full_look_s: float = 0.02
+    gap_prior: float = 4.5
     gap_prior_count: float = 4.0
-    gap_prior_least_s: float = 0.02
+    gap_prior_least: float = 0.3
     gap_overlap: float = 0.5
     sure: float = 0.9
     longest_gap_s: float = 3.0

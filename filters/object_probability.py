@@ -180,8 +180,13 @@ def _weights(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> _W
     seen = beta_binomial(evidence.hits, evidence.misses, sensors.p_detect, c)
     chance = _by_chance(evidence.hits, evidence.misses, c)
     stood = evidence.stationary_hits, evidence.stationary_misses
-    moving = beta_binomial(evidence.hits - stood[0], evidence.misses - stood[1], sensors.p_detect, c)
+    moved = evidence.hits - stood[0], evidence.misses - stood[1]
+    # The detection that began the track is a look, too: a chance hit where the sensor cannot see it.
+    begins = np.arange(len(sensors.p_detect)) == evidence.owner[:, None]
+    birth = np.where(begins, math.log(c.chance_hit) - np.log(sensors.p_detect), 0.0)
+    moving = beta_binomial(*moved, sensors.p_detect, c)
     while_moving = np.log(sensors.stationary_unseen) + moving + _by_chance(*stood, c)
+    while_moving = while_moving + np.where((moved[0] <= 0.0) & (moved[1] <= 0.0), birth, 0.0)
     at_times = np.logaddexp(while_moving, np.log1p(-sensors.stationary_unseen) + seen)
     # Who never stood is one that it sees, or does not.
     told = stood[0] + stood[1] > 0.0
@@ -189,8 +194,7 @@ def _weights(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> _W
     scores = score_log_odds(evidence, sensors, c)
     prior = np.where(found, sensors.prior_odds, 0.0)
     # What a sensor finds by chance has the scores of clutter; but no track begins by chance.
-    begins = np.arange(scores.shape[1]) == evidence.owner[:, None]
-    never = np.log(sensors.unseen) + chance + np.where(begins, scores, 0.0)
+    never = np.log(sensors.unseen) + chance + np.where(begins, scores, 0.0) + birth
     object_seen = np.logaddexp(never, np.log1p(-sensors.unseen) + at_times + scores)
     by_chance = math.log1p(-c.shared_false) + chance + np.where(begins, prior, 0.0)
     shared = np.logaddexp(by_chance, math.log(c.shared_false) + seen + prior)

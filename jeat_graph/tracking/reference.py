@@ -42,7 +42,7 @@ from jeat_graph.tracking.reference_life import (
     compare_sensors,
     count_false_boxes,
     end_tracks,
-    is_due,
+    is_stationary,
     judge,
     learn,
     own_p_detect,
@@ -52,8 +52,6 @@ from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks,
 
 # Share of the running mean of a sensor's period that a scan keeps.
 _PERIOD_MEMORY = 0.9
-# A gap is longer than so many of the shortest period, or of this one (s), however slow the sensors.
-_GAP_PERIODS, _LONGEST_PERIOD_S = 1.5, 0.1
 # Tracks that show the camera's motion: really there, with so many detections, the last so recent (s).
 _CAMERA_DETECTIONS, _CAMERA_AGE_S = 2, 0.5
 # A pair that is possible is so however little it looks alike.
@@ -87,7 +85,6 @@ class Reported(NamedTuple):
     Attributes:
         tracks: (N,) the tracks after it, before any ends.
         reported: (N,) which are reported.
-        due: (N,) which a sensor that sees them as well as any has looked at since they were confirmed.
         takers: per scan (M,) identity of the track that took each box; every box has one.
         records: per scan, for the smoother.
         nis: per scan (M,) of `AssociatedPairs`, NaN where a box began a track.
@@ -96,7 +93,6 @@ class Reported(NamedTuple):
 
     tracks: ReferenceTracks
     reported: BoolArray
-    due: BoolArray
     takers: list[IntArray]
     records: list[FilterRecord]
     nis: list[FloatArray]
@@ -148,8 +144,7 @@ def step(
     for given, taker in zip(scans, takers, strict=True):
         count_false_boxes(state, given.sensor, taker, c)
     learn(state, t, c)
-    due = is_due(state, c)
-    out = Reported(state.tracks, report(state, due, c), due, takers, records, nis, noise_scale)
+    out = Reported(state.tracks, report(state, c), takers, records, nis, noise_scale)
     end_tracks(state, t, c)
     return out
 
@@ -297,9 +292,8 @@ def by_looks(ratio: FloatArray, alike: FloatArray | None) -> FloatArray:
 def count_gaps(state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs, c: ModelConstants) -> None:
     """Count the gaps that end now, and whether the object was where it had been predicted."""
     tracks = state.tracks
-    gap = state.time - tracks.evidence.last_s[pairs.track]
-    period = np.nanmin(np.append(state.period_s, _LONGEST_PERIOD_S))
-    ends = (tracks.real[pairs.track] > c.report) & (gap > _GAP_PERIODS * period)
+    gap = tracks.evidence.missed[pairs.track]
+    ends = (tracks.real[pairs.track] > c.report) & (gap > 0.0) & pairs.confirms
     predicted = box_sides.expected_corners(tracks.mean[pairs.track[ends]])
     found = scan.boxes[pairs.box[ends]]
     overlap = np.diagonal(box_sides.intersection_over_union(predicted, found))
@@ -368,7 +362,8 @@ def count_hits_and_misses(
     presence[missed] = visibility.miss(presence[missed], p_detect[missed])
     logits = scan.logits[pairs.box]
     found = evidence.Hits(hit, logits, pairs.ratio, stationary[hit], pairs.confirms)
-    counted = evidence.count_hits(tracks.evidence, found, k, clock, c)
+    expected = evidence.expect_hits(tracks.evidence, pairs.p_detect, tracks.sees[:, k], clock, c)
+    counted = evidence.count_hits(expected, found, k, clock, c)
     counted = evidence.count_misses(counted, missed, k, visible, stationary[missed], clock.weight)
     keep = math.exp(-clock.weight * c.correlation_time_s / c.track_p_detect_memory_s)
     recent_hits, recent_misses, used = (
@@ -389,13 +384,6 @@ def count_hits_and_misses(
         recent_misses=recent_misses,
         used=used,
     )
-
-
-def is_stationary(mean: FloatArray, c: ModelConstants) -> BoolArray:
-    """Return which objects (N,) of states (N, 2, 7) stand, as far as is known."""
-    speed2 = (mean[:, :, singer.VELOCITY] ** 2).sum(axis=1)
-    area = np.exp(mean[:, :, singer.LOG_SIZE].sum(axis=1))
-    return np.asarray(speed2 < c.stationary_speed**2 * area)
 
 
 def count_clutter(

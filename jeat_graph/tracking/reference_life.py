@@ -11,14 +11,12 @@ from jeat_graph.filters import box_sides, gap_survival, object_probability, sens
 from jeat_graph.filters.evidence import Evidence, ScanClock
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.picture_motion import CameraVelocity, with_velocity
-from jeat_graph.filters.singer import VELOCITY
+from jeat_graph.filters.singer import LOG_SIZE, VELOCITY
 from jeat_graph.filters.visibility import GONE
 from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks, SensorScan
 
 # Two times that differ by less are one (s).
 _SAME_TIME_S = 1e-6
-# One sensor sees a track about as well as another of which the track's own P_D is at most so much larger.
-_AS_WELL = 0.5
 _LEAST_AREA = 1e-9
 # Longer ago than this is no longer told apart (s).
 _LONGEST_AGO_S = 1e9
@@ -76,10 +74,19 @@ def compare_overlaps(state: ReferenceState) -> None:
     state.tracks = replace(tracks, evidence=replace(evidence, overlap=least))
 
 
+def is_stationary(mean: FloatArray, c: ModelConstants) -> BoolArray:
+    """Return which objects (N,) of states (N, 2, 7) stand, as far as is known."""
+    speed2 = (mean[:, :, VELOCITY] ** 2).sum(axis=1)
+    area = np.exp(mean[:, :, LOG_SIZE].sum(axis=1))
+    return np.asarray(speed2 < c.stationary_speed**2 * area)
+
+
 def judge(state: ReferenceState, c: ModelConstants) -> None:
     """Compute the posterior of every track."""
     belief = object_probability.posterior(state.tracks.evidence, state.sensors, c)
-    state.tracks = replace(state.tracks, real=belief.real, log_odds=belief.log_odds)
+    stationary = is_stationary(state.tracks.mean, c)[:, None]
+    sees = (1.0 - belief.unseen) * np.where(stationary, 1.0 - belief.stationary_unseen, 1.0)
+    state.tracks = replace(state.tracks, real=belief.real, log_odds=belief.log_odds, sees=sees)
 
 
 def count_false_boxes(state: ReferenceState, sensor: int, taker: IntArray, c: ModelConstants) -> None:
@@ -97,27 +104,16 @@ def learn(state: ReferenceState, t: float, c: ModelConstants) -> None:
         state.sensors = object_probability.learn_sensors(told, state.sensors, c)
 
 
-def report(state: ReferenceState, due: BoolArray, c: ModelConstants) -> BoolArray:
+def report(state: ReferenceState, c: ModelConstants) -> BoolArray:
     """Return which tracks (N,) are reported: real, and their gap, if any, likely to end well.
 
-    A gap begins with the last detection that confirmed the track, and counts once it is due (N,).
+    A gap begins with the last detection that confirmed the track, and counts what was to be expected since.
     """
-    gap = np.asarray(state.time - state.tracks.evidence.confirmed_s)
-    survival = np.where(due, gap_survival.survival(state.gaps, gap, c), 1.0)
-    inside = (share_inside(state) > c.inside_share) | (gap < _SAME_TIME_S)
-    return np.asarray((state.tracks.real * survival > c.report) & inside)
-
-
-def is_due(state: ReferenceState, c: ModelConstants) -> BoolArray:
-    """Return whether a sensor that sees a track (N,) about as well as any has looked since it was confirmed.
-
-    Until then it is no gap.
-    """
-    tracks = state.tracks
-    looked = state.last_look_s[None] > tracks.evidence.confirmed_s[:, None]
-    p_detect = own_p_detect(tracks, state.sensors.p_detect, c)
-    best = np.where(looked, p_detect, 0.0).max(axis=1, initial=0.0)
-    return np.asarray((best > 0.0) & (best >= _AS_WELL * p_detect.max(axis=1, initial=0.0)))
+    evidence = state.tracks.evidence
+    here = state.time - evidence.confirmed_s < _SAME_TIME_S
+    inside = (share_inside(state) > c.inside_share) | here
+    alive = state.tracks.real * gap_survival.survival(state.gaps, np.where(here, 0.0, evidence.missed), c)
+    return np.asarray((alive > c.report) & inside)
 
 
 def own_p_detect(tracks: ReferenceTracks, p_detect: FloatArray, c: ModelConstants) -> FloatArray:

@@ -46,7 +46,7 @@ class Step(NamedTuple):
         real: (N,) their posterior.
         used: (N,) the sensors that found them.
         confirmed: (N,) whether a detection of that time tells that they are still there.
-        due: (N,) whether a sensor that sees them as well as any has looked since.
+        missed: (N,) detections that were to be expected since one did, 0 where it is of that time.
     """
 
     t: float
@@ -55,7 +55,7 @@ class Step(NamedTuple):
     real: FloatArray
     used: IntArray
     confirmed: BoolArray
-    due: BoolArray
+    missed: FloatArray
 
     def track_ids(self) -> IntArray:
         """Return the identities (N,) of the tracks after it, before any ended."""
@@ -160,7 +160,8 @@ class ReferenceModel:
             (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
         )
         confirmed = tracks.evidence.confirmed_s == t
-        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used, confirmed, done.due)
+        missed = np.where(confirmed, 0.0, tracks.evidence.missed)
+        self._last = Step(t, done.records, tracks.track_id, tracks.real, tracks.used, confirmed, missed)
 
     def record(self) -> Step:
         """Return what the last step gave the smoother."""
@@ -281,23 +282,25 @@ class ReferenceModel:
         gap as long as it is to the nearer one of its ends ends well.
         """
         size, c = self._state.next_id, self.constants
-        before = self._last_seen_by_moment()
-        seen_next, final = np.full(size, np.inf), np.zeros(size)
+        steps = _with_sensors_of_their_time(self._steps)
+        before = _missed_before(steps, size)
+        seen_again, final = np.zeros(size, dtype=np.bool_), np.zeros(size)
+        whole = np.zeros(size)  # of the gap, where there is one; 0 at its end
         told = {}
         last_records = np.cumsum([len(one.records) for one in self._steps]) - 1
-        steps = _with_sensors_of_their_time(self._steps)
         for number in range(len(steps) - 1, -1, -1):
             moment = steps[number]
             ids, found = moment.track_id, moment.confirmed
-            last = found & np.isinf(seen_next[ids])
+            last = found & ~seen_again[ids]
             final[ids[last]] = moment.real[last]
-            seen_next[ids[found]] = moment.t
+            seen_again[ids[found]] = True
+            whole[ids] = np.where(found, 0.0, np.maximum(whole[ids], moment.missed))
             real = np.where(final[ids] > c.sure, np.maximum(moment.real, final[ids]), moment.real)
-            nearer = np.minimum(moment.t - before[number], seen_next[ids] - moment.t)
-            real = np.where(~moment.due, real, real * gap_survival.survival(self._state.gaps, nearer, c))
+            nearer = np.minimum(moment.missed, whole[ids] - before[number])
+            real = real * gap_survival.survival(self._state.gaps, nearer, c)
             if number + 1 < len(steps) and steps[number + 1].t == moment.t:
                 continue  # a later step of the same time tells more
-            told[int(last_records[number])] = moment, np.where(np.isinf(seen_next[ids]), 0.0, real)
+            told[int(last_records[number])] = moment, np.where(seen_again[ids], real, 0.0)
         parts = []
         for record, mean, covariance in smooth([one for taken in self._steps for one in taken.records]):
             if record in told:
@@ -307,15 +310,6 @@ class ReferenceModel:
                 called = [self._called[track] for track in moment.track_id[rows].tolist()]
                 parts.append(_rows(moment.t, moment.track_id[rows], *state, c, called))
         return _joined(parts[::-1])
-
-    def _last_seen_by_moment(self) -> list[FloatArray]:
-        """Return when the tracks (N,) of each moment had been seen last (s)."""
-        last, out = np.full(self._state.next_id, -np.inf), []
-        for moment in self._steps:
-            found = moment.track_id[moment.confirmed]
-            last[found] = moment.t
-            out.append(last[moment.track_id])
-        return out
 
     def drain(self) -> ModelRows:
         """Return no rows: whole tracks are final when the recording ends."""
@@ -350,7 +344,7 @@ def _with_sensors_of_their_time(steps: Sequence[Step]) -> list[Step]:
     """Return steps whose tracks have been found by the sensors of earlier steps of the same time as well."""
     out: list[Step] = []
     for one in steps:
-        used, confirmed, due = one.used, one.confirmed, one.due
+        used, confirmed = one.used, one.confirmed
         if out and out[-1].t == one.t:
             before = out[-1]
             lived = np.isin(before.track_id, one.track_id)
@@ -358,7 +352,17 @@ def _with_sensors_of_their_time(steps: Sequence[Step]) -> list[Step]:
             rows = np.searchsorted(one.track_id, before.track_id[lived])
             used[rows] |= before.used[lived]
             confirmed[rows] |= before.confirmed[lived]
-        out.append(one._replace(used=used, confirmed=confirmed, due=due & ~confirmed))
+        missed = np.where(confirmed, 0.0, one.missed)
+        out.append(one._replace(used=used, confirmed=confirmed, missed=missed))
+    return out
+
+
+def _missed_before(steps: Sequence[Step], size: int) -> list[FloatArray]:
+    """Return what had been missed of the tracks (N,) by the step before each; `size` bounds identities."""
+    last, out = np.zeros(size), []
+    for one in steps:
+        out.append(last[one.track_id])
+        last[one.track_id] = one.missed
     return out
 
 

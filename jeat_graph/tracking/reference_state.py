@@ -50,11 +50,12 @@ class ReferenceTracks(ArrayTable):
         evidence: what the posterior rests on.
         real: (N,) posterior of a real object, as of the last step.
         log_odds: (N,) its log odds.
+        sees: (N, S) probability that a sensor is not blind to it as it moves now.
         used: (N,) bit k is set where sensor k has found it at the time of this step.
     """
 
     PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
-        ("recent_hits", "recent_misses", "last_box", "last_box_s")
+        ("recent_hits", "recent_misses", "last_box", "last_box_s", "sees")
     )
 
     track_id: IntArray
@@ -70,6 +71,7 @@ class ReferenceTracks(ArrayTable):
     evidence: Evidence
     real: FloatArray
     log_odds: FloatArray
+    sees: FloatArray
     used: IntArray
 
     def __len__(self) -> int:
@@ -93,6 +95,7 @@ class ReferenceTracks(ArrayTable):
             evidence=evidence,
             real=np.zeros(number),
             log_odds=np.zeros(number),
+            sees=np.zeros((number, sensors)),
             used=np.int64(1) << evidence.owner,
         )
 

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.stats import beta
 
 from jeat_graph.filters import object_probability as op
-from jeat_graph.filters.evidence import Evidence, Hits, ScanClock, count_hits
+from jeat_graph.filters.evidence import Evidence, Hits, ScanClock, count_hits, expect_hits
 from jeat_graph.filters.model_constants import ModelConstants
 
 C = ModelConstants()
@@ -46,6 +46,7 @@ def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detectio
         born_s=np.zeros(1),
         last_s=np.ones(1),
         confirmed_s=np.ones(1),
+        missed=np.zeros(1),
     )
 
 
@@ -76,6 +77,9 @@ def enumerated(evidence, sensors):
         * (1 - C.chance_hit) ** stood[1][s]
         for s in range(S)
     ]
+    # The detection that began the track is a look at which it was found by chance, not because it is seen.
+    born = [C.chance_hit / sensors.p_detect[s] if s == evidence.owner[0] else 1.0 for s in range(S)]
+    moved = [hits[s] > stood[0][s] or misses[s] > stood[1][s] for s in range(S)]
     odds = [np.exp(sensors.indifference[s] + evidence.peak[0, s]) if found[s] else 1.0 for s in range(S)]
     prior = [np.exp(sensors.prior_odds[s]) if found[s] else 1.0 for s in range(S)]
     real = 0.0
@@ -86,8 +90,8 @@ def enumerated(evidence, sensors):
             b = sensors.stationary_unseen[s] if stood[0][s] + stood[1][s] > 0 else 0.0
             ways = {
                 "always": (1 - g) * (1 - b) * seen[s],
-                "moving": (1 - g) * b * moving[s],
-                "never": g * chance[s],
+                "moving": (1 - g) * b * moving[s] * (1.0 if moved[s] else born[s]),
+                "never": g * chance[s] * born[s],
             }
             # By chance a sensor finds clutter, with the scores of clutter; but it begins no track by chance.
             by_chance = sees[s] == "never" and s != evidence.owner[0]
@@ -240,6 +244,20 @@ def test_learning_from_nothing_changes_nothing():
     assert op.learn_sensors(Evidence.none(2), sensors, C) is sensors
 
 
+def test_one_lone_box_of_a_sensor_is_no_free_chance_hit():
+    """Whom a sensor never sees, or not while it stands, it finds by chance, the first time too."""
+    believed = sensors_of(1, unseen=0.4, stationary_unseen=0.6)
+    for stood in (0.0, 1.0):
+        lone = op.posterior(evidence_of([1.0], [9.0], [1.0], stood=stood), believed, C)
+        of_birth = C.chance_hit / believed.p_detect[0]
+        seen = marginal(1.0, 9.0, believed.p_detect[0]) * 0.6
+        blind = 0.4 * C.chance_hit * (1 - C.chance_hit) ** 9 * of_birth
+        if stood:
+            while_still = 0.6 * C.chance_hit * (1 - C.chance_hit) ** 9 * of_birth
+            seen = 0.6 * (0.4 * marginal(1.0, 9.0, believed.p_detect[0]) + while_still)
+        assert lone.unseen[0, 0] == pytest.approx(blind / (blind + seen), rel=1e-6)
+
+
 def test_scores_count_once_a_track_however_often_it_is_found():
     logits, clock = np.array([1.0]), ScanClock(0.0, 0.05, 0.05 / 0.3)
     evidence = Evidence.of_births(0.0, 0, 1, logits, np.zeros(1), clock.weight)
@@ -251,6 +269,19 @@ def test_scores_count_once_a_track_however_often_it_is_found():
     assert evidence.hits[0, 0] == pytest.approx(99 * 0.05 / 0.3)
     assert evidence.last_s[0] == pytest.approx(4.95)
     assert evidence.confirmed_s[0] == pytest.approx(0.05 * 59)
+
+
+def test_a_gap_is_what_was_to_be_expected():
+    """Slow looks count in full, fast ones in part, and what a sensor is blind to is no gap."""
+    evidence = evidence_of([9.0, 9.0], [0.0, 0.0], [1.0, 1.0])
+    for _ in range(4):
+        evidence = expect_hits(evidence, np.array([0.8]), np.array([1.0]), ScanClock(0.0, 0.1, 0.3), C)
+        evidence = expect_hits(evidence, np.array([0.5]), np.array([0.1]), ScanClock(0.0, 0.01, 0.03), C)
+    assert evidence.missed[0] == pytest.approx(4 * (0.8 + 0.5 * 0.1 * 0.01 / C.full_look_s))
+    for confirms, left in ((False, evidence.missed[0]), (True, 0.0)):
+        hits = Hits(np.array([0]), np.zeros(1), np.zeros(1), np.array([False]), np.array([confirms]))
+        found = count_hits(evidence, hits, 0, ScanClock(0.1, 0.1, 0.3), C)
+        assert found.missed[0] == left
 
 
 def test_a_sensor_more_changes_no_posterior():

@@ -80,16 +80,16 @@ def test_a_miss_is_bayes_rule():
 
 def test_survival_goes_from_the_prior_to_what_is_counted():
     counts = gap_survival.no_gaps()
-    prior = gap_survival.survival(counts, np.array([0.0, 0.5, 9.0]), C)
-    np.testing.assert_allclose(prior, np.exp(-np.array([0.02, 0.4, 1.8]) / C.gap_prior_s))
+    prior = gap_survival.survival(counts, np.array([0.0, 0.1, 7.5, 99.0]), C)
+    np.testing.assert_allclose(prior, [1.0, *np.exp(-np.array([C.gap_prior_least, 6.0, 27.0]) / C.gap_prior)])
     for _ in range(1000):
-        counts = gap_survival.count_ends(counts, np.array([0.5, 0.5]), np.array([True, False]))
-    half = gap_survival.survival(counts, np.array([0.1, 0.45]), C)
+        counts = gap_survival.count_ends(counts, np.array([7.5, 7.5]), np.array([True, False]))
+    half = gap_survival.survival(counts, np.array([1.5, 7.0]), C)
     np.testing.assert_allclose(half, 0.5, atol=0.01)
     # No gap lasted longer: the prior stands.
-    assert gap_survival.survival(counts, np.array([2.0]), C)[0] == pytest.approx(prior[2])
+    assert gap_survival.survival(counts, np.array([30.0]), C)[0] == pytest.approx(prior[3])
     lost = gap_survival.count_losses(counts, 10_000)
-    assert gap_survival.survival(lost, np.array([0.1]), C)[0] < 0.1
+    assert gap_survival.survival(lost, np.array([1.5]), C)[0] < 0.1
 
 
 def test_scores_above_which_boxes_come_again_are_found():

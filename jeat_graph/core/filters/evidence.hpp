@@ -14,10 +14,12 @@ namespace jeat::filters {
 struct ScanClock {
     double t, period_s, weight;
     double keep_recent, keep_total;  // share of the sums of logits that a scan keeps
+    double full;                     // how much of a look it is, in expected hits
 
     ScanClock(double t, double period_s, const ModelConstants& c)
         : t(t), period_s(period_s), weight(std::min(1.0, period_s / c.correlation_time_s)),
-          keep_recent(exp_of(-period_s / c.smoothing_s)), keep_total(exp_of(-period_s / c.mean_memory_s)) {}
+          keep_recent(exp_of(-period_s / c.smoothing_s)), keep_total(exp_of(-period_s / c.mean_memory_s)),
+          full(std::min(1.0, period_s / c.full_look_s)) {}
 };
 
 struct Evidence {
@@ -26,7 +28,7 @@ struct Evidence {
     std::vector<std::uint8_t> found;
     std::vector<double> overlap, gained, detections;
     std::vector<std::int64_t> owner;
-    std::vector<double> born_s, last_s, confirmed_s;
+    std::vector<double> born_s, last_s, confirmed_s, missed;
 
     std::size_t size() const { return owner.size(); }
 
@@ -48,6 +50,7 @@ struct Evidence {
         visit("born_s", born_s, 1);
         visit("last_s", last_s, 1);
         visit("confirmed_s", confirmed_s, 1);
+        visit("missed", missed, 1);
     }
 
     void widen() {
@@ -89,7 +92,12 @@ struct Evidence {
         gained[row] += std::min(gain, c.most_gain);
         detections[row] += 1.0;
         last_s[row] = clock.t;
-        if (confirms) confirmed_s[row] = clock.t;
+        if (confirms) confirmed_s[row] = clock.t, missed[row] = 0.0;
+    }
+
+    // If a look finds nothing, the detections that were to be expected add up.
+    void expect_hit(std::size_t row, double p_detect, double sees, const ScanClock& clock) {
+        missed[row] += p_detect * sees * clock.full;
     }
 
     void count_miss(std::size_t row, std::size_t sensor, double visible, bool stationary, double weight) {

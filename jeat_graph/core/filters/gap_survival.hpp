@@ -1,4 +1,4 @@
-// How long an unseen track is reported; the formulas are in filters/gap_survival.py.
+// How long an unseen track is reported; the formulas are in filters/gapurvival.py.
 #pragma once
 
 #include <algorithm>
@@ -10,13 +10,13 @@
 namespace jeat::filters {
 
 inline constexpr int kGapBins = 9;
-inline constexpr std::array<double, kGapBins + 1> kGapBinsS{0.0, 0.04, 0.08, 0.15, 0.25, 0.4, 0.7, 1.1, 1.8, 3.0};
+inline constexpr std::array<double, kGapBins + 1> kGapBinEnds{0.0, 0.6, 1.2, 2.25, 3.75, 6.0, 10.5, 16.5, 27.0, 45.0};
 
 struct GapCounts {
     std::array<double, kGapBins> ended{}, ended_well{};
 
-    void count_end(double gap_s, bool well) {
-        for (int k = 0; k < kGapBins && kGapBinsS[k] < gap_s; ++k) {
+    void count_end(double gap, bool well) {
+        for (int k = 0; k < kGapBins && kGapBinEnds[k] < gap; ++k) {
             ended[k] += 1.0;
             ended_well[k] += well ? 1.0 : 0.0;
         }
@@ -24,10 +24,11 @@ struct GapCounts {
     void count_loss() {
         for (double& number : ended) number += 1.0;
     }
-    double survival(double gap_s, const ModelConstants& c) const {
+    double survival(double gap, const ModelConstants& c) const {
+        if (!(gap > 0.0)) return 1.0;
         int k = 0;
-        while (k + 1 < kGapBins && kGapBinsS[k + 1] <= gap_s) ++k;
-        const double prior = exp_of(-std::max(kGapBinsS[k], c.gap_prior_least_s) / c.gap_prior_s);
+        while (k + 1 < kGapBins && kGapBinEnds[k + 1] <= gap) ++k;
+        const double prior = exp_of(-std::max(kGapBinEnds[k], c.gap_prior_least) / c.gap_prior);
         return (ended_well[k] + c.gap_prior_count * prior) / (ended[k] + c.gap_prior_count);
     }
 };

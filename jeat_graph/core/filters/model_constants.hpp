@@ -104,9 +104,10 @@ struct Bounds {
     JEAT_ONE(hidden_to_visible) \
     JEAT_ONE(visible_to_gone) \
     JEAT_ONE(hidden_to_gone) \
-    JEAT_ONE(gap_prior_s) \
+    JEAT_ONE(full_look_s) \
+    JEAT_ONE(gap_prior) \
     JEAT_ONE(gap_prior_count) \
-    JEAT_ONE(gap_prior_least_s) \
+    JEAT_ONE(gap_prior_least) \
     JEAT_ONE(gap_overlap) \
     JEAT_ONE(sure) \
     JEAT_ONE(longest_gap_s) \

@@ -40,6 +40,7 @@ public:
         for (const double p : sensors.p_detect) {
             a_.push_back(p * c.p_detect_strength);
             b_.push_back((1.0 - p) * c.p_detect_strength);
+            log_p_detect_.push_back(log_of(p));
             log_beta_.push_back(log_beta(a_.back(), b_.back()));
         }
         for (const double g : sensors.unseen) {
@@ -69,17 +70,21 @@ public:
             const double hs = e.stationary_hits[first + s], ms = e.stationary_misses[first + s];
             double sees = seen_[s];
             out_.stationary_unseen[s] = 0.0;
+            // The detection that began the track is a look, too: a chance hit where the sensor cannot see it.
+            const bool began = static_cast<std::size_t>(e.owner[row]) == s;
+            const double birth = began ? log_chance_ - log_p_detect_[s] : 0.0;
             if (hs + ms > 0.0) {
-                const double blind = log_stationary_[s] + log_beta(a_[s] + h - hs, b_[s] + m - ms) - log_beta_[s] +
+                const double moved = h - hs <= 0.0 && m - ms <= 0.0 ? birth : 0.0;
+                const double blind = log_stationary_[s] + moved + log_beta(a_[s] + h - hs, b_[s] + m - ms) - log_beta_[s] +
                                      hs * log_chance_ + ms * log_no_chance_;
                 sees = log_add(blind, log_not_stationary_[s] + seen_[s]);
                 out_.stationary_unseen[s] = exp_of(blind - sees);
             }
-            const bool found = e.found[first + s], began = static_cast<std::size_t>(e.owner[row]) == s;
+            const bool found = e.found[first + s];
             const double prior = found ? sensors_.prior_odds[s] : 0.0;
             scores_[s] = found ? sensors_.indifference[s] + score(e, first + s) : 0.0;
             // Scores of what a sensor finds by chance are those of clutter; but a track does not begin by chance.
-            const double never = log_unseen_[s] + chance + (began ? scores_[s] : 0.0);
+            const double never = log_unseen_[s] + chance + (began ? scores_[s] : 0.0) + birth;
             const double object = log_add(never, log_not_unseen_[s] + sees + scores_[s]);
             out_.unseen[s] = exp_of(never - object);
             shared_[s] = log_add(log_not_shared_ + chance + (began ? prior : 0.0), log_shared_ + seen_[s] + prior);
@@ -108,7 +113,7 @@ private:
 
     const SensorBelief& sensors_;
     const ModelConstants& c_;
-    std::vector<double> a_, b_, log_beta_, log_unseen_, log_not_unseen_, log_stationary_, log_not_stationary_;
+    std::vector<double> a_, b_, log_p_detect_, log_beta_, log_unseen_, log_not_unseen_, log_stationary_, log_not_stationary_;
     std::vector<double> seen_, shared_, scores_;
     double log_chance_, log_no_chance_, log_shared_, log_not_shared_, noise_odds_;
     Posterior out_;

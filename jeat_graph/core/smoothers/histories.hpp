@@ -80,7 +80,7 @@ struct Entry {
     double real = 0.0;  // posterior after the step, where this was its last update
     std::int64_t used = 0;
     bool confirmed = false;  // by a detection of that time
-    bool due = false;        // a sensor that sees it as well as any has looked since
+    double missed = 0.0;     // detections that were to be expected since one did; 0 where it is of that time
     bool last_of_step = false;
     std::array<double, kMean> predicted_mean, mean;
     Halves predicted_covariance, covariance;
@@ -120,7 +120,8 @@ struct Record {
 struct History {
     std::int64_t track_id = 0;
     Called called;
-    double last_seen = -std::numeric_limits<double>::infinity();  // before the first entry (s)
+    // What had been missed by the last entry that was given out; below 0 before the first.
+    double missed = -1.0;
     std::vector<Entry> entries;
 };
 
@@ -187,7 +188,7 @@ private:
     // Which share of the second lag a track waits for: of the first window as its identity says, then all of it.
     static double share_of(const History& history) {
         constexpr double kGolden = 0.6180339887498949;
-        if (std::isfinite(history.last_seen)) return 1.0;  // its first rows are out
+        if (history.missed >= 0.0) return 1.0;  // its first rows are out
         const double turns = kGolden * static_cast<double>(history.track_id & 0xffff);
         return turns - std::floor(turns);
     }
@@ -226,32 +227,36 @@ private:
             if (entries[k + 1].t == entries[k].t) {
                 entries[k + 1].used |= entries[k].used;
                 entries[k + 1].confirmed |= entries[k].confirmed;
-                entries[k + 1].due &= !entries[k + 1].confirmed;
+                if (entries[k + 1].confirmed) entries[k + 1].missed = 0.0;
             }
-        double final_real = 0.0, next_seen = std::numeric_limits<double>::infinity();
-        until_seen_.assign(n, 0.0);
+        double final_real = 0.0, whole = 0.0;
+        bool seen_again = false;
+        gap_.assign(n, kNotSeenAgain);
         for (std::size_t k = n; k-- > 0;) {
-            if (entries[k].confirmed && entries[k].last_of_step) {
-                if (!std::isfinite(next_seen)) final_real = entries[k].real;
-                next_seen = entries[k].t;
+            if (!entries[k].last_of_step) continue;
+            if (entries[k].confirmed) {
+                if (!seen_again) final_real = entries[k].real;
+                seen_again = true;
             }
-            until_seen_[k] = next_seen - entries[k].t;
+            whole = entries[k].confirmed ? 0.0 : std::max(whole, entries[k].missed);
+            if (seen_again) gap_[k] = whole;
         }
         std::size_t given = 0;
-        double last_seen = history.last_seen;
+        double before = std::max(history.missed, 0.0);
         for (; given < n && entries[given].t <= until; ++given) {
             const Entry& e = entries[given];
             if (!e.last_of_step) continue;
-            if (e.confirmed) last_seen = e.t;
+            const double nearer = std::min(e.missed, gap_[given] - before);
+            before = e.missed;
             double real = final_real > c.sure ? std::max(e.real, final_real) : e.real;
-            if (!std::isfinite(until_seen_[given])) continue;  // not seen again
+            if (gap_[given] == kNotSeenAgain) continue;
             if (given + 1 < n && entries[given + 1].t == e.t) continue;  // a later step of the same time tells more
-            if (e.due) real *= gaps.survival(std::min(e.t - last_seen, until_seen_[given]), c);
+            real *= gaps.survival(nearer, c);
             if (real > c.report)
                 out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used, c);
         }
         if (!forget) return;
-        history.last_seen = last_seen;
+        history.missed = before;
         entries.erase(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(given));
     }
 
@@ -263,13 +268,14 @@ private:
         return F_;
     }
 
+    static constexpr double kNotSeenAgain = -1.0;
     double lag_s_, dt_ = -1.0;
     Matrix F_{};
     std::vector<History> living_;
     Rows rows_;
     std::vector<std::array<double, kMean>> mean_;
     std::vector<std::array<double, kCovariance>> covariance_;
-    std::vector<double> until_seen_;
+    std::vector<double> gap_;  // of each entry, the whole gap that it lies in
 };
 
 }  // namespace jeat::smoothers

@@ -34,7 +34,7 @@ struct Tracks {
     std::vector<double> last_box_s;
     std::vector<double> innovation;            // learn_noise
     std::vector<std::uint8_t> has_innovation;
-    std::vector<double> real, log_odds;        // judge
+    std::vector<double> real, log_odds, sees;  // judge
     Evidence evidence;                         // count_hits_and_misses, compare_overlaps
 
     std::size_t size() const { return track_id.size(); }
@@ -56,6 +56,7 @@ struct Tracks {
         visit("has_innovation", has_innovation, 1);
         visit("real", real, 1);
         visit("log_odds", log_odds, 1);
+        visit("sees", sees, S);
     }
     template <class Visit> void columns(Visit visit) {
         own_columns(visit);
@@ -68,6 +69,7 @@ struct Tracks {
         widen_rows(recent_misses, rows, S, 1);
         widen_rows(last_box, rows, S, 1);
         widen_rows(last_box_s, rows, S, 1);
+        widen_rows(sees, rows, S, 1);
         evidence.widen();
     }
 };

@@ -18,8 +18,8 @@
 
 namespace jeat::tracking {
 
-inline constexpr double kPeriodMemory = 0.9, kGapPeriods = 1.5, kLongestPeriodS = 0.1;
-inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6, kAsWell = 0.5;
+inline constexpr double kPeriodMemory = 0.9;
+inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6;
 // Longer ago than this is no longer told apart (s).
 inline constexpr double kLongestAgoS = 1e9;
 
@@ -78,7 +78,7 @@ public:
             entries[i].real = s_.tracks.real[i];
             entries[i].used = s_.tracks.used[i];
             entries[i].confirmed = s_.tracks.evidence.confirmed_s[i] == s_.t;
-            entries[i].due = due_[i];
+            entries[i].missed = entries[i].confirmed ? 0.0 : s_.tracks.evidence.missed[i];
             entries[i].last_of_step = true;
         }
     }
@@ -336,13 +336,10 @@ private:
 
     void count_gaps() {
         Tracks& tracks = s_.tracks;
-        double period = kLongestPeriodS;
-        for (const Sensor& sensor : s_.sensors)
-            if (!std::isnan(sensor.period_s)) period = std::min(period, sensor.period_s);
         for (const std::size_t k : made_) {
             const std::size_t i = pairs_[k].row;
-            const double gap = unseen_for(i);
-            if (!(tracks.real[i] > c_.report) || !(gap > kGapPeriods * period)) continue;
+            const double gap = tracks.evidence.missed[i];
+            if (!(tracks.real[i] > c_.report) || !(gap > 0.0) || !confirms_[pairs_[k].column]) continue;
             s_.gaps.count_end(gap, intersection_over_union(expected_[i].box, boxes_[pairs_[k].column]) >= c_.gap_overlap);
         }
     }
@@ -399,6 +396,7 @@ private:
             hits *= keep;
             misses *= keep;
             const bool stationary = is_stationary(i);
+            tracks.evidence.expect_hit(i, p_detect_[i], tracks.sees[i * S + k], clock);
             if (pair_of_[i] == pairs_.size()) {
                 const double visible = presence[kVisible];
                 miss_presence(presence, stationary ? p_detect_[i] * (1.0 - s_.belief.stationary_unseen[k]) : p_detect_[i]);
@@ -505,8 +503,13 @@ private:
     void judge() {
         Tracks& tracks = s_.tracks;
         PosteriorRule rule(s_.belief, c_);
+        const std::size_t S = s_.sensors.size();
         for (std::size_t i = 0; i < tracks.size(); ++i) {
-            tracks.log_odds[i] = rule(tracks.evidence, i).log_odds;
+            const Posterior& belief = rule(tracks.evidence, i);
+            tracks.log_odds[i] = belief.log_odds;
+            const bool stationary = is_stationary(i);
+            for (std::size_t k = 0; k < S; ++k)
+                tracks.sees[i * S + k] = (1.0 - belief.unseen[k]) * (stationary ? 1.0 - belief.stationary_unseen[k] : 1.0);
             tracks.real[i] = expit(tracks.log_odds[i]);
         }
     }
@@ -534,25 +537,11 @@ private:
     void report(std::vector<std::uint8_t>& reported) {
         Tracks& tracks = s_.tracks;
         reported.resize(tracks.size());
-        due_.resize(tracks.size());
         for (std::size_t i = 0; i < tracks.size(); ++i) {
-            const double gap = s_.t - tracks.evidence.confirmed_s[i];
-            due_[i] = is_due(i);
-            const double survival = due_[i] ? s_.gaps.survival(gap, c_) : 1.0;
-            reported[i] = tracks.real[i] * survival > c_.report &&
-                          (gap < kSameTimeS || share_inside(i) > c_.inside_share);
+            const bool here = s_.t - tracks.evidence.confirmed_s[i] < kSameTimeS;
+            const double survival = s_.gaps.survival(here ? 0.0 : tracks.evidence.missed[i], c_);
+            reported[i] = tracks.real[i] * survival > c_.report && (here || share_inside(i) > c_.inside_share);
         }
-    }
-
-    // Whether a sensor that sees a track about as well as any other has looked since it was confirmed.
-    bool is_due(std::size_t row) const {
-        double best = 0.0, looked = 0.0;
-        for (std::size_t k = 0; k < s_.sensors.size(); ++k) {
-            const double p = own_p_detect(row, k);
-            best = std::max(best, p);
-            if (s_.sensors[k].last_look_s > s_.tracks.evidence.confirmed_s[row]) looked = std::max(looked, p);
-        }
-        return looked > 0.0 && looked >= kAsWell * best;
     }
 
     // A track's own P_D by a sensor.
@@ -612,7 +601,6 @@ private:
     std::vector<SidesExpected> expected_;
     std::vector<double> p_detect_, q_, of_clutter_;
     std::vector<std::uint8_t> confirms_;  // of the scan's boxes
-    std::vector<std::uint8_t> due_;       // of the tracks that are told
     std::vector<std::array<double, 4>> innovations_;  // of the pairs that are made
     std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
     std::vector<CameraTrack> camera_tracks_, moved_tracks_;
