@@ -1,23 +1,22 @@
 """Count the vehicles that cross a line in the picture, by direction, and say how sure the counts are.
 
-A track crosses a line if it passes from one side to the other between its ends. A vehicle that wavers on
-the line, or a box that jitters over it, counts once or not at all; one that has gone round and comes again
-counts again.
+A track crosses a line if it passes from one side to the other between its ends. A vehicle that turns beyond
+the line and comes back crosses it both ways; a box that jitters over it does not cross it (`eval.paths`).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.steps import check_steps
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.eval.passing import LineCrossing, Meetings, in_order, passages
 
 #: Both tails of a 95 % interval together.
 TAILS = 0.05
@@ -49,91 +48,36 @@ class Line:
         """Length (px)."""
         return math.hypot(self.x2 - self.x1, self.y2 - self.y1)
 
+    @property
+    def directions(self) -> tuple[str, str]:
+        """`left` and `right`."""
+        return "left", "right"
 
-@dataclass(frozen=True)
-class LineCrossing:
-    """One crossing of one line by a track.
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest x, y (px)."""
+        ends = np.array([[self.x1, self.y1], [self.x2, self.y2]])
+        return ends.min(axis=0), ends.max(axis=0)
 
-    Attributes:
-        line: name of the line.
-        track_id: the track.
-        t: time of the crossing (s), by linear interpolation between rows.
-        direction: `left` or `right` (see `Line`).
-        probability: that a vehicle really crossed: that it exists, and that it was on one side before and on
-            the other after, given the uncertainty of its position; NaN where the table does not know that.
-        vehicle_class: class of the track, empty where unknown.
-    """
-
-    line: str
-    track_id: int
-    t: float
-    direction: str
-    probability: float
-    vehicle_class: str = ""
-
-
-def crossings(table: Trajectories, line: Line, classes: dict[int, str] | None = None) -> list[LineCrossing]:
-    """Find where tracks cross a line.
-
-    Args:
-        table: causal or smoothed rows, in any order.
-        line: the line.
-        classes: class of each track, if known.
-
-    Returns:
-        In order of time, then of identity.
-    """
-    if not len(table):
-        return []
-    order = np.lexsort((table.t, table.track_id))
-    ids = table.track_id[order]
-    starts = np.flatnonzero(np.diff(ids, prepend=ids[0] - 1))
-    found = []
-    for start, end in zip(starts, np.append(starts[1:], len(ids)), strict=True):
-        rows = order[start:end]
-        track = int(ids[start])
-        name = (classes or {}).get(track, "")
-        found += [
-            LineCrossing(line.name, track, t, direction, probability, name)
-            for t, direction, probability in _crossings_of(table, rows, line)
-        ]
-    return sorted(found, key=lambda c: (c.t, c.track_id))
+    def meetings(self, ways: FloatArray) -> Meetings:
+        """Find where ways (K, M, 2) cross it between its ends."""
+        direction = np.array([self.x2 - self.x1, self.y2 - self.y1]) / self.length
+        normal = np.array([-direction[1], direction[0]])  # to the right of the line, with y pointing down
+        side, along = (ways - (self.x1, self.y1)) @ normal, (ways - (self.x1, self.y1)) @ direction
+        way, step = np.nonzero((side[:, :-1] < 0.0) != (side[:, 1:] < 0.0))
+        before, after = side[way, step], side[way, step + 1]
+        share = before / (before - after)
+        place = along[way, step] + share * (along[way, step + 1] - along[way, step])
+        within = (place >= 0.0) & (place <= self.length)
+        second = (before < 0.0).astype(np.int64)
+        return in_order(way[within], (step + share)[within], second[within])
 
 
-def _crossings_of(table: Trajectories, rows: IntArray, line: Line) -> Iterator[tuple[float, str, float]]:
-    """Time, direction and probability of each crossing of one track, its rows in order of time."""
-    direction = np.array([line.x2 - line.x1, line.y2 - line.y1]) / line.length
-    normal = np.array([-direction[1], direction[0]])  # to the right of the line, with y pointing down
-    centre = table.mean[rows, :2] - (line.x1, line.y1)
-    side, along = centre @ normal, centre @ direction
-    change = np.flatnonzero((side[:-1] < 0.0) != (side[1:] < 0.0))
-    if not len(change):
-        return
-    share = side[change] / (side[change] - side[change + 1])
-    place = along[change] + share * (along[change + 1] - along[change])
-    within = (place >= 0.0) & (place <= line.length)
-    sure = side / np.sqrt(np.maximum(table.var[rows, :2] @ normal**2, 1e-12))
-    times, existence = table.t[rows], float(table.existence[rows].max())
-    # Who passes the line beyond its ends comes back as anew: what is over there does not count with the rest.
-    beyond = np.concatenate([[-1], np.flatnonzero(~within), [len(change)]])
-    for last_beyond, next_beyond in itertools.pairwise(beyond.tolist()):
-        group = np.arange(last_beyond + 1, next_beyond)
-        # An even number of changes leaves the track where it was.
-        if len(group) % 2 == 0:
-            continue
-        k, part = int(change[group[-1]]), float(share[group[-1]])
-        begin = change[last_beyond] + 1 if last_beyond >= 0 else 0
-        end = change[next_beyond] + 1 if next_beyond < len(change) else len(rows)
-        sign = 1.0 if side[k] < 0.0 else -1.0
-        before = _phi(float((-sign * sure[begin : change[group[0]] + 1]).max()))
-        after = _phi(float((sign * sure[k + 1 : end]).max()))
-        t = float(times[k] + part * (times[k + 1] - times[k]))
-        yield t, "right" if sign > 0.0 else "left", existence * before * after
-
-
-def _phi(z: float) -> float:
-    """Probability that a standard normal variable is at most z."""
-    return 0.5 * math.erfc(-z / math.sqrt(2.0))
+def crossings(
+    table: Trajectories, line: Line, classes: Mapping[int, str] | None = None
+) -> list[LineCrossing]:
+    """Find where tracks cross a line (`eval.passing.passages`, what is counted of it)."""
+    return [one for one in passages(table, line, classes) if one.counted]
 
 
 @dataclass(frozen=True)
@@ -146,10 +90,11 @@ class Count:
         vehicle_class: class, empty for those without.
         t_from: begin of the interval (s).
         t_to: its end (s).
-        count: tracks that crossed.
-        expected: expected number of vehicles, the sum of the crossings' probabilities; NaN if not known.
-        low: with `high` the 95 % interval of the number of vehicles among these tracks: none to all of them
-            where the probabilities are not known.
+        count: tracks that crossed: those for which it is likelier than not.
+        expected: expected number of vehicles, the sum of the probabilities of these and of the other possible
+            crossings; NaN if not known.
+        low: with `high` the 95 % interval of the number of vehicles among the tracks: none to all that were
+            counted where the probabilities are not known. It holds `count`.
         high: see `low`.
     """
 
@@ -196,6 +141,21 @@ def observed_s(begin: float, end: float, span: tuple[float, float]) -> float:
     return max(min(end, span[1]) - max(begin, span[0]), 0.0)
 
 
+#: Of less time than this (s) no flow an hour is told: one vehicle more or less would be 360 an hour.
+LEAST_FLOW_S = 10.0
+_S_PER_HOUR = 3600.0
+
+
+def per_hour(number: int, seen_s: float) -> float:
+    """Return a flow (vehicles an hour) of what was counted in a time; NaN of less than `LEAST_FLOW_S`.
+
+    Args:
+        number: vehicles.
+        seen_s: how long was watched (s).
+    """
+    return _S_PER_HOUR * number / seen_s if seen_s >= LEAST_FLOW_S else math.nan
+
+
 def count(
     found: Sequence[LineCrossing],
     edges: FloatArray,
@@ -207,7 +167,7 @@ def count(
     """Count crossings by line, direction, class and interval.
 
     Args:
-        found: the crossings.
+        found: the crossings, those that are only possible too (`passages`).
         edges: (K + 1,) ascending bounds of K intervals (s); what lies outside is not counted.
         lines: names of all lines; one that nobody crosses has counts of 0 in both directions.
         zones: names of all zones, likewise; their directions are `in` and `out`.
@@ -216,22 +176,24 @@ def count(
     Returns:
         One entry for every combination that occurs and every interval, by line, direction, class and time.
     """
-    crossed = {c.line for c in found}
+    crossed = {c.line for c in found if c.counted}
     ways = [(name, way) for name in lines for way in ("left", "right")]
     ways += [(name, way) for name in zones for way in ("in", "out")]
-    classes = {c.vehicle_class for c in found} or {""}
+    classes = {c.vehicle_class for c in found if c.counted} or {""}
     if complete:
         none = {(name, way, kind) for name, way in ways for kind in classes}
     else:
         none = {(name, way, "") for name, way in ways if name not in crossed}
-    groups = sorted({(c.line, c.direction, c.vehicle_class) for c in found} | none)
+    groups = sorted({(c.line, c.direction, c.vehicle_class) for c in found if c.counted} | none)
     counts = []
     for line, direction, name in groups:
         mine = [c for c in found if (c.line, c.direction, c.vehicle_class) == (line, direction, name)]
         for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
-            p = [c.probability for c in mine if a <= c.t < b]
+            own = [c for c in mine if a <= c.t < b]
+            p, number = [c.probability for c in own], sum(c.counted for c in own)
             low, high = count_interval(p)
-            counts.append(Count(line, direction, name, a, b, len(p), float(sum(p)), low, high))
+            low, high = min(low, number), max(high, number)
+            counts.append(Count(line, direction, name, a, b, number, float(sum(p)), low, high))
     return counts
 
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.eval.counting import Line, LineCrossing, observed_s
+from jeat_graph.eval.counting import Line, observed_s, per_hour
+from jeat_graph.eval.passing import LineCrossing
 
-_S_PER_HOUR = 3600.0
 _PERCENT = 100.0
 #: Decimal places of a share of an interval (per cent).
 _PLACES = 3
@@ -36,8 +36,9 @@ class StationRecord:
         t_to: its end (s).
         observed: share of the interval that the recording covers (per cent).
         flow: vehicles.
-        flow_per_hour: vehicles an hour, of the time that was observed; NaN where none was.
-        occupancy: share of the observed time in which a vehicle covers the line (per cent); NaN likewise.
+        flow_per_hour: vehicles an hour, of the time that was observed; NaN where that is below 10 s.
+        occupancy: share of the observed time in which a vehicle covers the line (per cent); NaN where none
+            was observed.
         headway_s: mean time from the crossing before to each crossing (s); NaN without two.
         speed_kmh: mean speed (km/h), where a road says it, else NaN.
         by_class: vehicles of each class.
@@ -121,7 +122,7 @@ def stations(
                         end,
                         round(_PERCENT * seen / (end - begin), _PLACES),
                         len(own_rows),
-                        _S_PER_HOUR * len(own_rows) / seen if seen else math.nan,
+                        per_hour(len(own_rows), seen),
                         min(_PERCENT * _union(stays) / seen, _PERCENT) if seen else math.nan,
                         _mean(gaps[inside].tolist()),
                         _mean([speed[k] for k in own_rows]),

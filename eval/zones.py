@@ -1,24 +1,27 @@
 """Vehicles that enter and leave zones of the picture, and the ways between zones and lines.
 
-A vehicle is where the centre of its box is. One that leaves a zone for a moment has not left it.
+A vehicle is where the centre of its box is. Counts and ways are of the same crossings (`eval.passing`).
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.eval.counting import LineCrossing
+from jeat_graph.eval.passing import LineCrossing, Meetings, passages
 
 IN, OUT = "in", "out"
-#: Who comes back after so long was never away (s).
-_AWAY_S = 1.0
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Third component of the cross product of vectors (..., 2)."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 @dataclass(frozen=True)
@@ -49,45 +52,51 @@ class Zone:
             within ^= beside & (x < x1 + (y - y1) * (x2 - x1) / (y2 - y1))
         return within
 
+    @property
+    def directions(self) -> tuple[str, str]:
+        """`in` and `out`."""
+        return IN, OUT
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest x, y (px)."""
+        corners = np.array(self.corners)
+        return corners.min(axis=0), corners.max(axis=0)
+
+    def meetings(self, ways: FloatArray) -> Meetings:
+        """Find where ways (K, M, 2) enter and leave it.
+
+        A step crosses a side if its ends lie on either side of that, and the side's ends on either side of
+        the step. A corner belongs to the same side of a step for both sides that meet there, so that a way
+        through a corner enters or leaves once.
+        """
+        begin, move = ways[:, :-1], np.diff(ways, axis=1)
+        way, at = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+        corners = np.array(self.corners)
+        beside = [_cross(move, corner - begin) > 0.0 for corner in corners]
+        for k, (a, b) in enumerate(zip(corners, np.roll(corners, -1, axis=0), strict=True)):
+            side = _cross(b - a, ways - a)
+            split = ((side[:, :-1] > 0.0) != (side[:, 1:] > 0.0)) & (
+                beside[k] != beside[(k + 1) % len(corners)]
+            )
+            j, step = np.nonzero(split)
+            before, after = side[j, step], side[j, step + 1]
+            way.append(j)
+            at.append(step + before / (before - after))
+        way_of, at_of = np.concatenate(way), np.concatenate(at)
+        order = np.lexsort((at_of, way_of))
+        way_of, at_of = way_of[order], at_of[order]
+        rank = np.arange(len(way_of)) - np.searchsorted(way_of, way_of)
+        # Who is within at first leaves first, and so on in turns.
+        within = self.holds(ways[:, 0])
+        return Meetings(way_of, at_of, (rank + within[way_of]) % 2)
+
 
 def zone_crossings(
     table: Trajectories, zone: Zone, classes: Mapping[int, str] | None = None
 ) -> list[LineCrossing]:
-    """Find when tracks enter and leave a zone.
-
-    Args:
-        table: causal or smoothed rows, in any order.
-        zone: the zone.
-        classes: class of each track, if known.
-
-    Returns:
-        By time, then identity; directions are `in` and `out`. A track that begins within has no `in`, one
-        that ends within no `out`. The time is the middle between two rows, the probability that of existence.
-    """
-    order = np.lexsort((table.t, table.track_id))
-    found = []
-    for ids in np.split(order, np.flatnonzero(np.diff(table.track_id[order])) + 1):
-        if not len(ids):
-            continue
-        times, track = table.t[ids], int(table.track_id[ids[0]])
-        within = _steady(zone.holds(table.mean[ids, :2]), times)
-        likely = float(table.existence[ids].max())
-        name = (classes or {}).get(track, "")
-        for k in np.flatnonzero(within[1:] != within[:-1]).tolist():
-            way = IN if within[k + 1] else OUT
-            t = float(times[k] + times[k + 1]) / 2.0
-            found.append(LineCrossing(zone.name, track, t, way, likely, name))
-    return sorted(found, key=lambda c: (c.t, c.track_id))
-
-
-def _steady(within: BoolArray, times: FloatArray) -> BoolArray:
-    """Fill the gaps (N,) in which a track was away for a moment."""
-    out = within.copy()
-    edges = np.flatnonzero(np.diff(within)) + 1
-    for begin, end in itertools.pairwise(edges.tolist()):
-        if not within[begin] and times[end] - times[begin] < _AWAY_S:
-            out[begin:end] = True
-    return out
+    """Find when tracks enter and leave a zone (`eval.passing.passages`, what is counted of it)."""
+    return [one for one in passages(table, zone, classes) if one.counted]
 
 
 @dataclass(frozen=True)
@@ -97,7 +106,8 @@ class Journey:
     Attributes:
         track_id: the track.
         origin: the first line or zone that it met.
-        destination: the last one that it met after another; empty if it met no other.
+        destination: the last one that it met; the origin again, if it came back to it (a U-turn); empty if
+            it met the origin alone, and once.
         t_from: when it met the first (s).
         t_to: when it met the last (s).
         vehicle_class: its class, empty where unknown.
@@ -118,13 +128,14 @@ def journeys(found: Sequence[LineCrossing]) -> list[Journey]:
         found: crossings of lines and zones.
     """
     by_track: dict[int, list[LineCrossing]] = {}
-    for crossing in sorted(found, key=lambda c: (c.t, c.track_id)):
+    for crossing in sorted((c for c in found if c.counted), key=lambda c: (c.t, c.track_id)):
         by_track.setdefault(crossing.track_id, []).append(crossing)
     out = []
     for track, own in by_track.items():
         first, last = own[0], own[-1]
-        places = [name for name, _ in itertools.groupby(c.line for c in own)]
-        destination = places[-1] if len(places) > 1 else ""
+        # To enter a zone and then to leave it is one visit of it; any other crossing begins another.
+        visits = 1 + sum((a.line, a.direction, b.direction) != (b.line, IN, OUT) for a, b in pairwise(own))
+        destination = last.line if visits > 1 else ""
         out.append(Journey(track, first.line, destination, first.t, last.t, first.vehicle_class))
     return sorted(out, key=lambda j: (j.t_to, j.track_id))
 
@@ -159,7 +170,7 @@ def od_table(found: Sequence[Journey], edges: FloatArray, names: Sequence[str]) 
         names: of all lines and zones.
     """
     classes = sorted({j.vehicle_class for j in found}) or [""]
-    bounds = list(itertools.pairwise(edges.tolist()))
+    bounds = list(pairwise(edges.tolist()))
     number: dict[tuple[str, str, str, int], int] = {}
     for journey in found:
         k = int(np.searchsorted(edges, journey.t_to, side="right")) - 1

@@ -25,7 +25,8 @@ from jeat_graph.cli.place_options import add_places, places
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.eval.counting import Count, Line, LineCrossing
+from jeat_graph.eval.counting import Count, Line
+from jeat_graph.eval.passing import LineCrossing
 
 if TYPE_CHECKING:
     from jeat_graph.data.arrays import FloatArray
@@ -96,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     """Count."""
     from jeat_graph.eval import counting
     from jeat_graph.eval.load import recording_span, tables_of
-    from jeat_graph.eval.zones import zone_crossings
+    from jeat_graph.eval.passing import passages
     from jeat_graph.io.tables.table_writer import write_columns
     from jeat_graph.io.tables.trajectories_io import read_trajectories
 
@@ -112,13 +113,14 @@ def run(args: argparse.Namespace) -> int:
     if args.classes is not None:
         table = table.of_class(*args.classes, final=True)
     known = table.final_classes()
-    at_lines = [c for line in lines for c in counting.crossings(table, line, known)]
-    at_zones = [c for zone in zones for c in zone_crossings(table, zone, known)]
-    found = [replace(c, t=c.t + later_s) for c in (*at_lines, *at_zones)]
+    possible = [replace(c, t=c.t + later_s) for p in (*lines, *zones) for c in passages(table, p, known)]
+    found = [c for c in possible if c.counted]
+    named = {line.name for line in lines}
+    at_lines = [replace(c, t=c.t - later_s) for c in found if c.line in named]
     span = first + later_s, last + later_s
-    edges = _edges(args.interval, span, found)
+    edges = _edges(args.interval, span, possible)
     counts = counting.count(
-        found,
+        possible,
         edges,
         [line.name for line in lines],
         zones=[zone.name for zone in zones],
@@ -232,7 +234,7 @@ def _show(counts: list[Count], *, shown: bool) -> None:
         }
         for c in counts
     ]
-    print(Table.from_records(records).render() if shown else "no track crosses a line")
+    print(Table.from_records(records).render() if shown else "no track crosses a line or a zone")
     if any(np.isnan(c.expected) for c in counts):
         say("count", "no interval: the table has no variances of position (`track` writes them)")
 
@@ -241,5 +243,6 @@ def _columns(rows: list[Any], kind: type) -> dict[str, npt.NDArray[Any]]:
     """One column an attribute, rounded; classes that are not known are left out."""
     names = [f.name for f in dataclasses.fields(kind)]
     columns = rounded({name: np.array([getattr(row, name) for row in rows]) for name in names})
+    columns.pop("counted", None)
     classes = columns.pop("vehicle_class")
     return columns | {"class": classes} if any(classes) else columns

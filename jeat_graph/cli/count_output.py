@@ -18,7 +18,7 @@ from jeat_graph.eval.stations import StationRecord
 from jeat_graph.io.tables.rounding import round_decimals
 
 if TYPE_CHECKING:
-    from jeat_graph.eval.counting import LineCrossing
+    from jeat_graph.eval.passing import LineCrossing
     from jeat_graph.io.exports.datex2 import Publication
 
 #: Two letters of the country, and a name.

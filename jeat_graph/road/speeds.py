@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.config.fields import check, number
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.evidence import within
 from jeat_graph.road.key_motion import RoadMotion
 from jeat_graph.road.motion_fit import MotionFitConfig, fit_motion, thinned
+from jeat_graph.road.stuck import vehicles_part
 
 KMH = 3.6
 Z95 = 1.959963984540054
@@ -64,8 +65,12 @@ UNKNOWN_SPEED = Speed(math.nan, math.nan, math.nan, math.nan, math.nan)
 
 def told(speed: Speed) -> Speed:
     """Return a speed, or `UNKNOWN_SPEED` where next to nothing is known of it."""
-    reach = speed.high_kmh - speed.kmh
-    return speed if reach <= max(_MOST_REACH_KMH, _MOST_REACH_SHARE * speed.kmh) else UNKNOWN_SPEED
+    return speed if is_told(speed.kmh, speed.high_kmh - speed.kmh) else UNKNOWN_SPEED
+
+
+def is_told(kmh: float, reach_kmh: float) -> bool:
+    """Whether enough is known of a speed (km/h) whose 95 % interval reaches so far to either side."""
+    return reach_kmh <= max(_MOST_REACH_KMH, _MOST_REACH_SHARE * kmh)
 
 
 def interval(kmh: float, noise: float, calibration: float) -> Speed:
@@ -126,6 +131,8 @@ def fit_vehicle(
     all_t = t
     inside = within(pixels, (camera.width, camera.height), motion.edge_share)
     t, pixels = t[inside], pixels[inside]
+    own = _vehicles_part(t, pixels, camera, motion, contact)
+    t, pixels = t[own], pixels[own]
     if len(t) < _LEAST_POINTS:
         return None
     t, pixels, counts = thinned(t, pixels, motion)
@@ -147,6 +154,20 @@ def fit_vehicle(
         1.0 / (float(camera.position[2]) - contact.height_m),
         contact.spread_m,
     )
+
+
+def _vehicles_part(
+    t: FloatArray, pixels: FloatArray, camera: RoadCamera, motion: MotionFitConfig, contact: ContactConfig
+) -> IntArray:
+    """Indices of the points (N, 2) on the road that are not of an end that stays behind."""
+    xy = camera.to_road(pixels, contact.height_m)
+    seen = np.flatnonzero(np.isfinite(xy).all(axis=1))
+    if len(seen) < _LEAST_POINTS:
+        return np.arange(len(t))
+    metres = camera.to_road_jacobian(xy[seen], contact.height_m)
+    sigma = np.sqrt((metres**2).sum(axis=(1, 2))) * math.hypot(motion.white_px, motion.memory_px)
+    own: IntArray = seen[vehicles_part(t[seen], xy[seen], sigma)]
+    return own
 
 
 def _systematic(

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.fields import LARGEST, check, number
-from jeat_graph.eval.counting import interval_edges, observed_s
+from jeat_graph.eval.counting import interval_edges, observed_s, per_hour
 from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.results import RoadResult
@@ -82,7 +82,7 @@ def count_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.ND
     has every line, with all directions, lanes and classes. Rows of one direction, lane or class add up to
     that of all: vehicles in no lane or of no class have rows of their own, with an empty lane or class. The
     intervals are those of `jeat-graph count`. Vehicles an hour are of the time that the recording covers, of
-    which `observed` (per cent) is the share; NaN where it covers none.
+    which `observed` (per cent) is the share; NaN where it covers less than 10 s.
 
     The intervals of the speeds are for the vehicles that were there: by noise of each and by the calibration,
     which is wrong for all of them alike.
@@ -156,7 +156,7 @@ def _count_row(
         "t_end": end,
         "observed": 100.0 * seen / config.interval_s,
         "count": len(found),
-        "per_hour": 3600.0 * len(found) / seen if seen else math.nan,
+        "per_hour": per_hour(len(found), seen),
         **dict(zip(_SPEEDS, speed_summary([one.crossing.speed for one in found], config), strict=True)),
     }
 

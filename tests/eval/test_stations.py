@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from jeat_graph.eval.counting import Line, LineCrossing, crossings
+from jeat_graph.eval.counting import Line, crossings
+from jeat_graph.eval.passing import LineCrossing
 from jeat_graph.eval.stations import covered_s, stations
 
 from .test_counting import table
@@ -39,7 +40,10 @@ def test_records_have_flow_occupancy_headway_and_classes():
     right = [row for row in rows if row.direction == "right"]
     assert [row.flow for row in right] == [2, 1]
     assert [row.observed for row in right] == [100.0, 50.0]
-    assert [row.flow_per_hour for row in right] == [720.0, 720.0]  # of half an interval: twice one
+    assert right[0].flow_per_hour == 720.0
+    assert math.isnan(right[1].flow_per_hour)  # of 5 s nothing an hour is told
+    longer = stations(found, [0.5] * 3, ["gate"], np.array([0.0, 10.0, 30.0]), (0.0, 20.0))
+    assert [row.flow_per_hour for row in longer if row.direction == "right"] == [720.0, 360.0]  # 1 in 10 s
     assert [row.occupancy for row in right] == pytest.approx([20.0, 10.0])
     assert [row.headway_s for row in right] == [4.0, 6.0]
     assert [row.by_class for row in right] == [{"car": 1, "truck": 1}, {"car": 1, "truck": 0}]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.io.media.video import open_frames
+from jeat_graph.io.media.video import _spread, open_frames
 from jeat_graph.io.media.video_writer import FrameWriter
 
 SIZE = (64, 48)
@@ -174,3 +174,11 @@ def test_a_video_that_is_not_whole_is_told_of_and_leaves_nothing(tmp_path: Path,
     with pytest.raises(DataError, match=r"frames\.\w+: only 2 of 5 pictures could be written; is the disk"):
         half_written()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_gap_is_no_part_of_the_rate():
+    """25 Hz with a gap of 10 s is 25 a second, and a gap."""
+    times = np.concatenate([np.arange(20) / 25.0, 10.0 + np.arange(20) / 25.0])
+    assert _spread(times) == "25 a second, 1 gap(s) of up to 9.24 s"
+    assert _spread(times[:20]) == "25 a second"
+    assert _spread(np.cumsum([0.0, *[1 / 30] * 20, *[1 / 15] * 20])) == "15 to 30 a second"

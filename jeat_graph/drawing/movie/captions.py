@@ -62,14 +62,26 @@ class Captions:
 def read_speeds(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:
     """Read time (s), track and speed (km/h) of a table of the road (`road.csv`, `road_causal.csv`, …).
 
+    A speed is NaN where its interval is too wide for `road` to tell it, and where the vehicle's own in a
+    `speeds.csv` beside the table is blank.
+
     Raises:
         DataError: it is none.
     """
     from jeat_graph.io.tables.file_tables import read_table
+    from jeat_graph.road.speeds import Z95, is_told
 
-    table = read_table(path, ("t", "track_id", "speed_kmh"))
+    table = read_table(path, ("t", "track_id", "speed_kmh", "var_speed_kmh"))
     speed = table.number("speed_kmh", blank_ok=True, nan_ok=True)
-    return table.number("t"), table.whole("track_id"), speed
+    reach = Z95 * np.sqrt(table.number("var_speed_kmh", blank_ok=True, nan_ok=True))
+    track = table.whole("track_id")
+    told = np.array([is_told(v, r) for v, r in zip(speed.tolist(), reach.tolist(), strict=True)], dtype=bool)
+    beside = path.with_name("speeds.csv")
+    if path.name == "road.csv" and beside.is_file():
+        own = read_table(beside, ("track_id", "speed_kmh"))
+        blank = np.isnan(own.number("speed_kmh", blank_ok=True, nan_ok=True))
+        told &= ~np.isin(track, own.whole("track_id")[blank])
+    return table.number("t"), track, np.where(told, speed, np.nan)
 
 
 def _by_track(t: FloatArray, track_id: IntArray, values: FloatArray | TextArray) -> _ByTrack:

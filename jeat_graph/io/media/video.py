@@ -50,6 +50,8 @@ __all__ = [
 VIDEO_FILES = {"mp4": "frames.mp4", "webm": "frames.webm", "lossless": "frames.avi", "png": "frames"}
 # Frames of a video that come at one rate: its slowest and fastest steps differ by less than this factor.
 _STEADY = 1.1
+#: A step between two frames so many times as long as the usual one is a gap, not a rate.
+_GAP_STEPS = 5.0
 _KEPT_FRAMES = 32  # decoded frames that a reader keeps, for steps backwards
 
 
@@ -245,10 +247,14 @@ def _spread(times: FloatArray) -> str:
     """Say how many frames a second there are: one number, or from the slowest to the fastest."""
     if len(times) < 2:
         return "one frame"
-    slow, fast = 1.0 / np.quantile(np.diff(times), (0.98, 0.02))
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    gap = steps > _GAP_STEPS * usual
+    slow, fast = 1.0 / np.quantile(steps[~gap], (0.98, 0.02))
+    gaps = f", {gap.sum()} gap(s) of up to {steps.max():.3g} s" if gap.any() else ""
     if fast < _STEADY * slow:
-        return f"{len(times[1:]) / (times[-1] - times[0]):.4g} a second"
-    return f"{slow:.3g} to {fast:.3g} a second"
+        return f"{1.0 / float(steps[~gap].mean()):.4g} a second{gaps}"
+    return f"{slow:.3g} to {fast:.3g} a second{gaps}"
 
 
 def _decoder(place: Path) -> Decoder:

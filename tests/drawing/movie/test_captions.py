@@ -57,10 +57,20 @@ def test_parts_are_chosen():
 
 
 def test_speeds_are_those_of_the_road(tmp_path):
-    (tmp_path / "road.csv").write_text("t,track_id,speed_kmh\n0.1,3,50.5\n0.2,3,\n")
+    rows = "t,track_id,speed_kmh,var_speed_kmh\n0.1,3,50.5,4\n0.2,3,,\n"
+    (tmp_path / "road.csv").write_text(rows)
     t, track, speed = read_speeds(tmp_path / "road.csv")
     assert (t.tolist(), track.tolist(), speed[0]) == ([0.1, 0.2], [3, 3], 50.5)
     assert np.isnan(speed[1])
+
+
+def test_no_speed_is_shown_that_the_road_does_not_tell(tmp_path):
+    """Wider than ± 10 km/h and than half of the speed; and of a vehicle whose own speed is blank."""
+    rows = ["0.1,3,50.5,4", "0.2,3,50.5,170", "0.1,4,50.5,4", "0.1,5,12,20"]
+    (tmp_path / "road.csv").write_text("\n".join(["t,track_id,speed_kmh,var_speed_kmh", *rows]))
+    (tmp_path / "speeds.csv").write_text("track_id,speed_kmh\n3,50\n4,\n5,12\n")
+    _, _, speed = read_speeds(tmp_path / "road.csv")
+    assert np.isnan(speed).tolist() == [False, True, True, False]
 
 
 def test_a_line_counts_up_to_the_time_that_is_shown():
