@@ -137,11 +137,11 @@ def count(job: CountJob) -> dict[str, list[list[float]]]:
 
 
 def _counted(one: ReadyRecording, table: Trajectories, kind: str) -> list[float]:
-    from jeat_graph.eval.clear import clear_counts
     from jeat_graph.eval.frames import Kind, build_frames
-    from jeat_graph.eval.hota import hota_counts
-    from jeat_graph.eval.identity import identity_counts
     from jeat_graph.eval.overlapping import overlapping_pairs
+    from jeat_graph.eval.scores.clear import clear_counts
+    from jeat_graph.eval.scores.hota import hota_counts
+    from jeat_graph.eval.scores.identity import identity_counts
 
     as_kind: Kind = "causal" if kind == CAUSAL else "smoothed"
     frames = build_frames(one.truth, table, kind=as_kind, instants=one.instants, outside=True)
@@ -154,7 +154,7 @@ def _counted(one: ReadyRecording, table: Trajectories, kind: str) -> list[float]
 
 def headline(counts: FloatArray) -> FloatArray:
     """Scores (..., 3) in per cent, in the order of `HEADLINE`, of counts (..., K) that were added up."""
-    from jeat_graph.eval.hota import HotaCounts
+    from jeat_graph.eval.scores.hota import HotaCounts
 
     truth, tracks, matched, switched, explained = np.moveaxis(counts[..., :_FIRST], -1, 0)
     hits, summed = np.split(counts[..., _FIRST:], 2, axis=-1)

@@ -1,12 +1,6 @@
 """Truth and tracks side by side, frame by frame, with what is to be ignored taken out.
 
-Ignored truth (an object that is neither to be found nor to be held against a track) is dealt with once,
-here, before any metric:
-
-1. In each frame tracks and *all* truth boxes, ignored ones included, are matched one to one with the
-   largest total IoU among pairs of IoU >= 0.5. A track matched to an ignored box is taken out.
-2. A track that is matched to nothing and has at least half of its own area on one ignored box is taken out.
-3. The ignored boxes are taken out.
+What is ignored is dealt with once, here, before any metric, by the rules of a protocol (`eval.protocols`).
 """
 
 from __future__ import annotations
@@ -15,15 +9,15 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from jeat_graph.association.overlap import pairwise_covered, pairwise_iou
+from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.eval.matching import IGNORE_COVERED
 from jeat_graph.eval.matching import match as match
 from jeat_graph.eval.pairing import check_pair, check_truth
+from jeat_graph.eval.protocols.plain import PROTOCOL as PLAIN
+from jeat_graph.eval.protocols.record import FrameBoxes, RulesFor
 from jeat_graph.eval.resampling import (
     MAX_AGE_S,
     TIME_TOLERANCE_S,
@@ -36,7 +30,7 @@ from jeat_graph.eval.resampling import (
 )
 
 Kind = Literal["causal", "smoothed"]
-IGNORE_IOU = 0.5
+_ALL_AS_ONE = RulesFor(PLAIN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +80,7 @@ def build_frames(
     max_gap_s: float | None = None,
     instants: FloatArray | None = None,
     outside: bool = False,
+    rules: RulesFor = _ALL_AS_ONE,
 ) -> Frames:
     """Put tracks beside truth at the truth's times, and perhaps beside nothing where the truth has ended.
 
@@ -99,6 +94,7 @@ def build_frames(
         instants: all times at which the tracker ran, if known.
         outside: whether rows before the first and after the last frame of the truth make frames of their
             own, in which nothing is to be found (`resampling.rows_outside`).
+        rules: of what is judged.
 
     Raises:
         DataError: truth and tracks do not fit together, or one of them is not valid.
@@ -106,6 +102,7 @@ def build_frames(
     check_truth(truth)
     check_unique(table)
     check_pair(truth, table, max_age_s=max_age_s)
+    truth, table = rules.protocol.prepare(truth, table, rules.wanted)
     times = truth.frame_times()
     if kind == "causal":
         tracks = predict_to(table, times, max_age_s=max_age_s, instants=instants)
@@ -118,8 +115,8 @@ def build_frames(
     truth_row = np.argsort(frame_of_truth, kind="stable")
     truth_start = _starts(frame_of_truth, len(times))
     track_start = _starts(tracks.frame, len(times))
-    frames = _without_ignored(truth, times, truth_row, truth_start, tracks, track_start)
-    return replace(frames, outside=len(beyond))
+    frames = Frames(times, truth, truth_start, truth_row, track_start, tracks, (), len(beyond))
+    return _as_judged(frames, tracks, rules)
 
 
 def _frame_of(truth: GroundTruth, times: FloatArray) -> IntArray:
@@ -137,58 +134,40 @@ def _starts(frame: IntArray, count: int) -> IntArray:
     return np.concatenate(([0], np.cumsum(np.bincount(frame, minlength=count)))).astype(np.int64)
 
 
-def _without_ignored(
-    truth: GroundTruth,
-    times: FloatArray,
-    truth_row: IntArray,
-    truth_start: IntArray,
-    tracks: Resampled,
-    track_start: IntArray,
-) -> Frames:
-    boxes = truth.boxes[truth_row]
-    ignored = truth.ignore[truth_row]
-    keep_track = np.ones(len(tracks.frame), dtype=bool)
+def _as_judged(frames: Frames, all_tracks: Resampled, rules: RulesFor) -> Frames:
+    """Leave out of every frame what a protocol does not judge.
+
+    Args:
+        frames: with all boxes, and without `iou`.
+        all_tracks: the tracks' entries.
+        rules: of what is judged.
+    """
+    truth, rows = frames.truth, frames.truth_row
+    columns = {
+        "truth": truth.boxes[rows],
+        "ignore": truth.ignore[rows],
+        "classes": None if truth.classes is None else np.char.lower(truth.classes)[rows],
+        "truncation": None if truth.truncation is None else truth.truncation[rows],
+        "occlusion": None if truth.occlusion is None else truth.occlusion[rows],
+    }
+    keep_truth, keep_track = np.ones(len(rows), dtype=bool), np.ones(len(all_tracks.frame), dtype=bool)
     matrices: list[FloatArray] = []
-    for k in range(len(times)):
-        g = slice(int(truth_start[k]), int(truth_start[k + 1]))
-        m = slice(int(track_start[k]), int(track_start[k + 1]))
-        iou = pairwise_iou(boxes[g], tracks.boxes[m])
-        if ignored[g].any():
-            keep = tracks_to_judge(iou, boxes[g], ignored[g], tracks.boxes[m])
-            keep_track[m] = keep
-            iou = iou[np.ix_(~ignored[g], keep)]
-        matrices.append(iou)
-    frame_of_truth = np.repeat(np.arange(len(times)), np.diff(truth_start))[~ignored]
-    kept = Resampled(**{name: column[keep_track] for name, column in vars(tracks).items()})
-    return Frames(
-        times=times,
-        truth=truth,
-        truth_start=_starts(frame_of_truth, len(times)),
-        truth_row=truth_row[~ignored],
-        track_start=_starts(kept.frame, len(times)),
+    for k in range(len(frames.times)):
+        g = slice(int(frames.truth_start[k]), int(frames.truth_start[k + 1]))
+        m = slice(int(frames.track_start[k]), int(frames.track_start[k + 1]))
+        here = {name: None if column is None else column[g] for name, column in columns.items()}
+        boxes = all_tracks.boxes[m]
+        iou = pairwise_iou(columns["truth"][g], boxes)
+        found, counted = rules.protocol.judge(FrameBoxes(iou=iou, tracks=boxes, **here), rules.wanted)
+        keep_truth[g], keep_track[m] = found, counted
+        matrices.append(iou if found.all() and counted.all() else iou[np.ix_(found, counted)])
+    frame_of_truth = np.repeat(np.arange(len(frames.times)), np.diff(frames.truth_start))[keep_truth]
+    kept = Resampled(**{name: column[keep_track] for name, column in vars(all_tracks).items()})
+    return replace(
+        frames,
+        truth_start=_starts(frame_of_truth, len(frames.times)),
+        truth_row=rows[keep_truth],
+        track_start=_starts(kept.frame, len(frames.times)),
         tracks=kept,
         iou=tuple(matrices),
     )
-
-
-def tracks_to_judge(
-    iou: FloatArray, truth_boxes: FloatArray, ignored: npt.NDArray[np.bool_], track_boxes: FloatArray
-) -> npt.NDArray[np.bool_]:
-    """Tell which tracks of one frame are judged, and which lie on something to be ignored.
-
-    Args:
-        iou: (G, M) of truth and tracks.
-        truth_boxes: (G, 4).
-        ignored: (G,) true where the truth is to be ignored.
-        track_boxes: (M, 4).
-
-    Returns:
-        (M,) false where the track is to be taken out.
-    """
-    truth_of = match(iou, IGNORE_IOU)
-    matched = truth_of >= 0
-    on_ignored = (
-        pairwise_covered(track_boxes, truth_boxes[ignored]).max(axis=1, initial=0.0) >= IGNORE_COVERED
-    )
-    drop: npt.NDArray[np.bool_] = np.where(matched, ignored[truth_of], on_ignored)
-    return ~drop

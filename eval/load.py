@@ -4,30 +4,31 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import all_numbers, naming_hint, rows_of_class
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.notes import note
+from jeat_graph.data.frame_numbers import FrameCount
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.rates import ANY_RATE_HZ, median_rate_hz
 from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.tables.reading import Reading, ReadingOptions
+from jeat_graph.data.together import Reader, read_together
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
-from jeat_graph.eval.resampling import TIME_TOLERANCE_S, on_the_clock_of
+from jeat_graph.eval.resampling import on_the_clock_of
 from jeat_graph.io.files.beside import check_beside
-from jeat_graph.io.tables.formats import FIRST_OPEN
+from jeat_graph.io.formats.record import BoxFormat
+from jeat_graph.io.formats.registry import is_folder_of_boxes, recognise, written_formats
 from jeat_graph.io.tables.scans_io import read_instants
 from jeat_graph.io.tables.trajectories_io import read_trajectories_counted
 from jeat_graph.io.tables.truth_io import read_truth_counted
 
-SUFFIXES = (".csv", ".parquet")
 _SAME_RATE = 0.02  # relative: 29.97 Hz and 30 are one rate, 25 and 30 are two
 
 
@@ -51,6 +52,10 @@ class JudgedRun:
     smoothed: Trajectories | None
     instants: FloatArray | None = None
 
+    def table(self, kind: str) -> Trajectories | None:
+        """Return the table of a kind, `causal` or `smoothed`, or None."""
+        return self.causal if kind == "causal" else self.smoothed
+
     def known_instants(self) -> FloatArray | None:
         """Return `instants`, or what the causal table itself says of them.
 
@@ -68,12 +73,12 @@ def load_run(
     truth: str | Path,
     *,
     classes: Sequence[str] | None = None,
+    counted: FrameCount | None = None,
     **options: Unpack[ReadingOptions],
 ) -> JudgedRun:
     """Read a run and its truth, and check that they belong together.
 
-    Where both leave it open from which number their frames count, they count alike: from 0 where one of them
-    has a frame 0.
+    From which number their frames count is decided once for both (`data.together`).
 
     Args:
         run: a run directory, a trajectory table (taken as smoothed if its name has `smoothed` in it, else as
@@ -81,40 +86,33 @@ def load_run(
         truth: the truth, in any format that `read_truth` knows.
         classes: classes of objects to be found; others are ignored, and so are tracks that have another
             class. All by default.
+        counted: the frame numbers of a run directory's input, as `runs.beside.recorded_frames` gives them, or
+            None.
         options: as `tables.reading.Reading` has it: `rate_hz` of files that count frames, by default that of
-            the truth; `time_unit` of the truth's column `t` (runs are in seconds); `first_frame` of the run;
-            `video` of both; `class_names` of the run, and of the truth where that has numbers; `image`.
+            the truth; `time_unit` of the truth's column `t` (runs are in seconds); `first_frame` and `video`
+            of both; `class_names` of the run, and of the truth where that has numbers; `image`.
 
     Raises:
         DataError: a file is missing or not valid, or run and truth do not fit together.
     """
-    from jeat_graph.io.tables.formats import counts_frames, recognise
-
     path, truth_path, how = Path(run), Path(truth), Reading(**options)
     tables = tables_of(path)
     table = next(iter(tables.values()))
     form, truth_form = recognise(table), recognise(truth_path)
-    run_counts, truth_counts = counts_frames(table, form), counts_frames(truth_path, truth_form)
+    run_counts, truth_counts = form.counts_frames(table), truth_form.counts_frames(truth_path)
     rate_hz = how.rate_hz
-    if rate_hz is None and truth_counts and truth_form != "kitti":
-        rate_hz = _rate_beside(truth_path, truth_form, run_counts and form != "kitti")
-    objects, first = _read_truth(truth_path, replace(how, rate_hz=rate_hz, first_frame=None))
-    if rate_hz is not None and run_counts and not truth_counts:
-        _check_rate(rate_hz, objects, truth_path)
-    if rate_hz is None and run_counts:
-        rate_hz = median_rate_hz(objects.frame_times()) or ANY_RATE_HZ
-    counted = 0 if truth_form == "kitti" else first
-    own = replace(how, rate_hz=rate_hz, time_unit="s")
-    alike = how.first_frame is None and form in FIRST_OPEN
-    read: dict[str, Trajectories] = {}
-    for kind, file in with_progress(tables.items()):
-        if alike and counted == 0:
-            read[kind] = _from_0_as_truth(file, own, objects)
-            continue
-        read[kind], run_first = read_trajectories_counted(file, None, own)
-        if alike and run_first == 0 and first == 1:
-            note(f"{truth_path}: frames count from 0, as those of the run do")
-            objects, first = _read_truth(truth_path, replace(how, rate_hz=rate_hz, first_frame=0))
+    if rate_hz is None and truth_counts and truth_form.rate_hz is None:
+        rate_hz = _rate_beside(truth_path, truth_form, run_counts and form.rate_hz is None)
+    how = replace(how, rate_hz=rate_hz)
+    check = rate_hz is not None and run_counts and not truth_counts
+    pair = _TruthAndRun(truth_path, tables, how, run_counts, counted, check)
+    readers: list[Reader[Any]] = [
+        Reader(str(truth_path), pair.read_truth),
+        Reader(str(path), pair.read_run, settled=not run_counts),
+    ]
+    (objects, read), counts = read_together(readers, how.first_frame, truth=0)
+    if not run_counts:
+        objects = counted_as_run(objects, counted, counts[1], rate_hz or truth_form.rate_hz or ANY_RATE_HZ)
     instants = objects.frame_times() if run_counts else read_instants(path)
     for kind, file in tables.items():
         _check_fits(file, read[kind], objects, instants is None)
@@ -122,6 +120,37 @@ def load_run(
         objects = _restricted(objects, classes, truth_path)
         read = {kind: restrict_tracks(table, classes, objects) for kind, table in read.items()}
     return JudgedRun(str(run), objects, read.get("causal"), read.get("smoothed"), instants)
+
+
+@dataclass(eq=False)
+class _TruthAndRun:
+    """Reads a truth and its run, the truth first."""
+
+    truth_path: Path
+    tables: dict[str, Path]
+    how: Reading
+    run_counts: bool
+    counted: FrameCount | None
+    check_rate: bool
+    times: FloatArray = field(default_factory=lambda: np.zeros(0))
+
+    def read_truth(self, first: int | None) -> tuple[GroundTruth, FrameCount | None]:
+        found, count = _read_truth(self.truth_path, replace(self.how, first_frame=first))
+        self.times = found.frame_times()
+        if self.check_rate and self.how.rate_hz is not None:
+            _check_rate(self.how.rate_hz, found, self.truth_path)
+        return found, count
+
+    def read_run(self, first: int | None) -> tuple[dict[str, Trajectories], FrameCount | None]:
+        rate_hz = self.how.rate_hz
+        if rate_hz is None and self.run_counts:
+            rate_hz = median_rate_hz(self.times) or ANY_RATE_HZ  # the truth's own clock tells it
+        how = replace(self.how, rate_hz=rate_hz, time_unit="s", first_frame=first)
+        found, count = {}, self.counted
+        for kind, file in with_progress(self.tables.items()):
+            found[kind], own = read_trajectories_counted(file, None, how)
+            count = own or count
+        return found, count
 
 
 def restrict_classes(truth: GroundTruth, classes: Sequence[str]) -> GroundTruth:
@@ -179,19 +208,18 @@ def tables_of(path: Path) -> dict[str, Path]:
     Raises:
         DataError: there is no such path, or it is a directory without either table, or with a link elsewhere.
     """
-    from jeat_graph.io.tables.yolo_labels import is_label_folder
-
     if not path.exists():
         raise DataError("there is no such run directory or table", path)
     if not path.is_dir():
         return {"smoothed" if "smoothed" in path.stem else "causal": path}
     found = {}
+    suffixes = [one.suffix for one in written_formats() if one.is_table]
     for kind in ("causal", "smoothed"):
-        here = [path / (kind + suffix) for suffix in SUFFIXES if (path / (kind + suffix)).is_file()]
+        here = [path / (kind + suffix) for suffix in suffixes if (path / (kind + suffix)).is_file()]
         if here:
             check_beside(here[0], path)
             found[kind] = here[0]
-    if not found and is_label_folder(path):
+    if not found and is_folder_of_boxes(path):
         return {"causal": path}
     if not found:
         raise DataError("this directory has neither causal.csv nor smoothed.csv, so it is no run", path)
@@ -222,9 +250,16 @@ def read_tables(path: Path, **options: Unpack[ReadingOptions]) -> dict[str, Traj
     Raises:
         DataError: as `tables_of`; or a table is not valid.
     """
-    from jeat_graph.io.tables.trajectories_io import read_trajectories
+    return read_tables_counted(path, Reading(**options))[0]
 
-    return {kind: read_trajectories(file, **options) for kind, file in tables_of(path).items()}
+
+def read_tables_counted(path: Path, how: Reading) -> tuple[dict[str, Trajectories], FrameCount | None]:
+    """Read the tables of a run as `read_tables` does, and tell the frame numbers of a result that counts."""
+    found, count = {}, None
+    for kind, file in tables_of(path).items():
+        found[kind], own = read_trajectories_counted(file, None, how)
+        count = own or count
+    return found, count
 
 
 def recording_span(source: Path, file: Path, table: Trajectories) -> tuple[float, float]:
@@ -240,30 +275,25 @@ def recording_span(source: Path, file: Path, table: Trajectories) -> tuple[float
     Raises:
         DataError: `scans.csv` is not valid.
     """
-    from jeat_graph.io.tables.formats import BY_FRAME, recognise
-
     scans = read_instants(source)
     times = table.t if scans is None or not len(scans) else np.concatenate((table.t, scans))
     if not len(times):
         return 0.0, 0.0
-    by_frame = len(table) > 0 and recognise(file) in BY_FRAME
+    by_frame = len(table) > 0 and recognise(file).counts_frames(file)
     return 0.0 if by_frame else float(times.min()), float(times.max())
 
 
-def _rate_beside(truth: Path, form: str, any_will_do: bool) -> float:
-    """Rate of a truth that counts frames, from `seqinfo.ini`; any, where the run counts frames too."""
-    from jeat_graph.io.tables.motchallenge import sequence_info
-
-    info = sequence_info(truth)
-    if form == "motchallenge" and info.rate_hz is not None:
-        return check_rate(info.rate_hz, truth)
+def _rate_beside(truth: Path, form: BoxFormat, any_will_do: bool) -> float:
+    """Rate of a truth that counts frames, from a file beside it; any, where the run counts frames too."""
+    rate_hz = None if form.facts is None else form.facts(truth).rate_hz
+    if rate_hz is not None:
+        return check_rate(rate_hz, truth)
     if any_will_do:
         return ANY_RATE_HZ
-    name = "MOTChallenge truth" if form == "motchallenge" else "the truth"
-    raise DataError(f"{name} has frame numbers only; give the frame rate with --rate", truth)
+    raise DataError(f"{form.title} truth has frame numbers only; give the frame rate with --rate", truth)
 
 
-def _read_truth(path: Path, how: Reading) -> tuple[GroundTruth, int | None]:
+def _read_truth(path: Path, how: Reading) -> tuple[GroundTruth, FrameCount | None]:
     """Read and check the truth; numbers of classes get the user's names where it has no names itself."""
     truth, first = read_truth_counted(path, None, replace(how, class_names=None))
     if how.class_names is not None and truth.classes is not None and all_numbers(np.unique(truth.classes)):
@@ -275,18 +305,21 @@ def _read_truth(path: Path, how: Reading) -> tuple[GroundTruth, int | None]:
     return truth, first
 
 
-def _from_0_as_truth(path: Path, how: Reading, truth: GroundTruth) -> Trajectories:
-    """Let a result count from 0 as its truth does, unless it has no frame 0 and would end after the truth.
+def counted_as_run(
+    truth: GroundTruth, run: FrameCount | None, decided: FrameCount | None, rate_hz: float
+) -> GroundTruth:
+    """Move a truth to the clock of a run that was tracked before, which cannot be counted anew.
 
-    Trackers report nothing in their first frames, so that the lack of a frame 0 says little.
+    Args:
+        truth: the truth.
+        run: the frame numbers of the run's input, as it was read; None where it had times.
+        decided: the same with the first frame as it should have been.
+        rate_hz: frames per second.
     """
-    from_0, first = read_trajectories_counted(path, None, replace(how, first_frame=0))
-    if first is None or not len(from_0) or from_0.t.min() == 0.0:
-        return from_0
-    if from_0.t.max() > truth.frame_times()[-1] + TIME_TOLERANCE_S:
-        return read_trajectories_counted(path, None, how)[0]
-    note(f"{path}: frames count from 0, as those of the truth do (--first-frame 1 says otherwise)")
-    return from_0
+    if run is None or decided is None or run.first == decided.first:
+        return truth
+    by_s = (decided.first - run.first) / rate_hz
+    return replace(truth, t=truth.t + by_s, frames=truth.frame_times() + by_s)
 
 
 def _restricted(truth: GroundTruth, classes: Sequence[str], path: Path) -> GroundTruth:

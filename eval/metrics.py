@@ -1,52 +1,57 @@
-"""All tracking scores of tracks against truth, pooled over sequences: CLEAR, identity and HOTA.
+"""All tracking scores of tracks against truth, pooled over sequences, from every metric that there is.
 
-Each metric has a file of its own, `clear`, `identity` and `hota`; this one gathers what they say. The values
-are those of TrackEval, which the MOTChallenge and KITTI servers use.
+A metric is a module of `eval.scores` with a record `METRIC`; this is the only place that looks for them. The
+values of those that come along are those of TrackEval, which the MOTChallenge and KITTI servers use; what is
+ignored before they count is the business of `eval.protocols`.
 """
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import progress_span, with_progress
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.eval.clear import clear_counts, pooled_clear
 from jeat_graph.eval.frames import Frames, Kind, build_frames
-from jeat_graph.eval.hota import hota_counts, pooled_hota
-from jeat_graph.eval.identity import identity_counts, pooled_identity
-from jeat_graph.eval.overlapping import overlapping_pairs
+from jeat_graph.eval.overlapping import OverlappingPairs, overlapping_pairs
 from jeat_graph.eval.resampling import MAX_AGE_S
+from jeat_graph.eval.scores.record import Metric
 
-# Scores in per cent; the others are counts.
-SHARES = ("MOTA", "MOTP", "HOTA", "DetA", "AssA", "LocA", "IDF1", "IDP", "IDR")
-COUNTS = ("TP", "FP", "FN", "IDSW", "MT", "PT", "ML", "Frag")
+_PACKAGE = "jeat_graph.eval.scores"
+
+
+@cache
+def metrics() -> tuple[Metric[Any], ...]:
+    """Return the records of all metrics, by name."""
+    package = importlib.import_module(_PACKAGE)
+    names = [one.name for one in pkgutil.iter_modules(package.__path__)]
+    modules = [importlib.import_module(f"{_PACKAGE}.{name}") for name in names]
+    found: list[Metric[Any]] = [module.METRIC for module in modules if hasattr(module, "METRIC")]
+    return tuple(sorted(found, key=lambda one: one.name))
+
+
+def share_names() -> tuple[str, ...]:
+    """Return the names of the scores in per cent, in the order of tables."""
+    return tuple(name for one in metrics() for name in one.shares)
+
+
+def number_names(*, shown: bool = False) -> tuple[str, ...]:
+    """Return the names of the other scores; with `shown` those alone that tables have."""
+    return tuple(name for one in metrics() for name in one.numbers if not (shown and name in one.hidden))
 
 
 @dataclass(frozen=True)
 class Scores:
-    """Tracking scores, pooled over all sequences that were judged. Shares are in per cent.
+    """Tracking scores, pooled over all sequences that were judged: attributes by name, such as `MOTA`.
 
     Attributes:
-        MOTA: 1 - (FP + FN + IDSW) / truth boxes.
-        MOTP: mean IoU of the matches.
-        HOTA: geometric mean of DetA and AssA, averaged over the IoU thresholds 0.05, 0.10 … 0.95.
-        DetA: detection accuracy, averaged likewise.
-        AssA: association accuracy, averaged likewise.
-        LocA: localisation accuracy, averaged likewise.
-        IDF1: F1 score of the best one-to-one map of identities.
-        IDP: precision of that map.
-        IDR: recall of that map.
-        TP: matched boxes.
-        FP: track boxes without a truth box.
-        FN: truth boxes without a track.
-        IDSW: identity switches.
-        MT: objects tracked in more than 80 % of their frames.
-        PT: objects tracked in 20 to 80 %.
-        ML: objects tracked in less than 20 %.
-        Frag: interruptions of a tracked object.
+        values: every score by name: shares in per cent, then numbers (`Metric.shares`, `Metric.numbers`).
         truth_boxes: boxes to be found.
         truth_ids: objects.
         track_boxes: boxes reported.
@@ -55,23 +60,7 @@ class Scores:
         sequences: sequences judged.
     """
 
-    MOTA: float
-    MOTP: float
-    HOTA: float
-    DetA: float
-    AssA: float
-    LocA: float
-    IDF1: float
-    IDP: float
-    IDR: float
-    TP: int
-    FP: int
-    FN: int
-    IDSW: int
-    MT: int
-    PT: int
-    ML: int
-    Frag: int
+    values: dict[str, float | int]
     truth_boxes: int
     truth_ids: int
     track_boxes: int
@@ -79,9 +68,17 @@ class Scores:
     frames: int
     sequences: int
 
+    def __getattr__(self, name: str) -> float | int:
+        """Return a score by its name."""
+        try:
+            return self.__dict__["values"][name]
+        except KeyError:
+            raise AttributeError(f"there is no score {name}") from None
+
     def as_dict(self) -> dict[str, float | int]:
-        """Return the scores by name, in the order of the attributes."""
-        return asdict(self)
+        """Return the scores by name, shares first, then numbers, then what was judged."""
+        judged = ("truth_boxes", "truth_ids", "track_boxes", "track_ids", "frames", "sequences")
+        return self.values | {name: getattr(self, name) for name in judged}
 
 
 def evaluate(
@@ -134,22 +131,22 @@ def score_frames(sequences: Sequence[Frames], *, iou: float = 0.5) -> Scores:
         raise DataError(f"the IoU threshold must be in (0, 1], not {iou:g}")
     with progress_span(0.0, 0.4):
         pairs = [overlapping_pairs(frames) for frames in with_progress(sequences)]
-    clear = pooled_clear([clear_counts(one, iou) for one in pairs])
-    identity = pooled_identity([identity_counts(one, iou) for one in pairs])
-    with progress_span(0.6, 1.0):
-        hota = pooled_hota([hota_counts(one) for one in with_progress(pairs)])
-    counts = {name: getattr(clear, name) for name in COUNTS}
+    with progress_span(0.4, 1.0):
+        return scores_of_pairs(pairs, iou)
+
+
+def scores_of_pairs(pairs: Sequence[OverlappingPairs], iou: float) -> Scores:
+    """Score sequences by their boxes that overlap.
+
+    Args:
+        pairs: of each sequence.
+        iou: smallest IoU of a match in metrics that have no thresholds of their own.
+    """
+    found: dict[str, float | int] = {}
+    for metric in with_progress(metrics()):
+        found |= metric.scores(metric.pool([metric.count(one, iou) for one in with_progress(pairs)]))
     return Scores(
-        MOTA=100.0 * clear.mota,
-        MOTP=100.0 * clear.motp,
-        HOTA=100.0 * float(hota.hota.mean()),
-        DetA=100.0 * float(hota.deta.mean()),
-        AssA=100.0 * float(hota.assa.mean()),
-        LocA=100.0 * float(hota.loca.mean()),
-        IDF1=100.0 * identity.idf1,
-        IDP=100.0 * identity.idp,
-        IDR=100.0 * identity.idr,
-        **counts,
+        values={name: found[name] for name in (*share_names(), *number_names())},
         truth_boxes=sum(int(one.truth_count.sum()) for one in pairs),
         truth_ids=sum(len(one.truth_boxes_of) for one in pairs),
         track_boxes=sum(int(one.track_count.sum()) for one in pairs),

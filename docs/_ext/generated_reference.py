@@ -1,7 +1,7 @@
-"""Pages of the reference made from the code: commands from their parsers, settings from the schema.
+"""Pages of the reference made from the code: commands, settings, and what is registered by a record.
 
-The build of the documentation writes both, and so does `python docs/_ext/generated_reference.py`. That of the
-settings is kept in the repository, for those who read the pages there.
+The build of the documentation writes them, and so does `python docs/_ext/generated_reference.py`. Those of
+the settings and of the records are kept in the repository, for those who read the pages there.
 """
 
 from __future__ import annotations
@@ -163,13 +163,60 @@ def _shown(value: Any) -> str:
     return f"`{value:.15g}`" if isinstance(value, float) else f"`{value}`"
 
 
+_ABOUT_RECORDS = """# Formats, scores and protocols
+
+Made from the records in the code, one in a file of its own; `CONTRIBUTING.md` says how to add one.
+"""
+
+
+def records_page() -> str:
+    """Write what is found by a record as Markdown: formats of boxes, scores, protocols."""
+    from jeat_graph.eval.metrics import metrics
+    from jeat_graph.eval.protocols.registry import protocols
+    from jeat_graph.io.formats.registry import formats
+
+    read = [(f"`{one.name}`", one.title, one.reads, one.suffix and f"`{one.suffix}`") for one in formats()]
+    scores = [
+        (f"`{name}`", unit, meaning)
+        for one in metrics()
+        for unit, named in (("%", one.shares), ("", one.numbers))
+        for name, meaning in named.items()
+    ]
+    rules = [(f"`{one.name}`", one.says) for one in protocols()]
+    return "\n".join(
+        [
+            _ABOUT_RECORDS,
+            "## Files of boxes\n",
+            "Detections, ground truth and results. Without `--input-format` a format is told by its "
+            "bytes, then by the\nend of the file's name, then by the look of its first line.\n",
+            *_table(("format", "what", "what is read", "a run's tables"), read),
+            "## Scores\n",
+            *_table(("score", "unit", "meaning"), scores),
+            "## Protocols\n",
+            "Rules of `eval --protocol`.\n",
+            *_table(("protocol", "rules"), rules),
+        ]
+    )
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    """Lines of a table of Markdown, with a blank one behind them."""
+    lines = [head, tuple("---" for _ in head), *rows]
+    return [*(f"| {' | '.join(line)} |" for line in lines), ""]
+
+
 def write_pages(folder: Path) -> None:
-    """Write both pages, where they have changed.
+    """Write the pages, where they have changed.
 
     Args:
         folder: that of the reference.
     """
-    for name, text in (("commands.md", commands_page()), ("configuration.md", configuration_page())):
+    pages = {
+        "commands.md": commands_page(),
+        "configuration.md": configuration_page(),
+        "registered.md": records_page(),
+    }
+    for name, text in pages.items():
         path = folder / name
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Unpack
 
 from jeat_graph.api.beside import FUNCTION_GROUP, find
-from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, as_names, recording_of, tables_of, truth_of
+from jeat_graph.api.sources import PathLike, Run, Tracks, as_list, as_names, recording_of
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config, Preset
 from jeat_graph.data.detections import Detections
@@ -102,6 +102,8 @@ def evaluate(
     kind: Literal["causal", "smoothed"] = "causal",
     classes: Sequence[str] | None = None,
     outside: Literal["false", "ignored"] = "false",
+    protocol: str = "plain",
+    per_class: bool = False,
     **options: Unpack[ReadingOptions],
 ) -> dict[str, dict[str, float | int]]:
     """Judge tracks against truth.
@@ -115,46 +117,48 @@ def evaluate(
             class. All by default.
         outside: `false` if rows before the first and after the last time of the truth are false, which a
             warning names; `ignored` if they are not to be looked at.
+        protocol: rules of what is ignored: `plain`, or those of a challenge, `mot17`, `mot20` or `kitti`.
+        per_class: judge each class by itself, a track by its own class.
         options: how data frames and files are read, as `tables.reading.Reading` has it: `rate_hz` (Hz),
-            `first_frame` of tracks that count frames (of the truth, where these are no file or data frame),
-            `time_unit` of the truth, `video`, `class_names` …
+            `first_frame` where they count frames, `time_unit` of the truth, `video`, `class_names` …
 
     Returns:
-        By kind of table, MOTA, HOTA, IDF1 and so on by name, as `eval --json` writes them.
+        By kind of table, MOTA, HOTA, IDF1 and so on by name, as `eval --json` writes them. Where classes are
+        judged by themselves, `causal/car` and so on have those of a class, and `causal/mean` their mean.
 
     Raises:
         DataError: a file is not valid, or tracks and truth do not fit together.
     """
-    from jeat_graph.eval.judge import judge_runs, rows_beyond
+    from jeat_graph.api.together import tracks_and_truth
+    from jeat_graph.eval.judge import classes_apart, judge_runs, rows_beyond
     from jeat_graph.eval.load import JudgedRun, check_classes, load_run, restrict_classes, restrict_tracks
+    from jeat_graph.eval.protocols.registry import protocol_named
+    from jeat_graph.runs.beside import recorded_frames
 
-    classes = None if classes is None else as_names(classes)
+    classes, rules = None if classes is None else as_names(classes), protocol_named(protocol)
+    ignoring = None if per_class or rules.classes else classes
     if outside not in ("false", "ignored"):
         raise DataError(f"outside {outside!r}: must be false or ignored")
     if isinstance(tracks, (str, Path)) and isinstance(truth, (str, Path)):
-        run = load_run(tracks, truth, classes=classes, **options)
-        if classes is not None:
-            check_classes([run.truth], classes)
+        run = load_run(tracks, truth, classes=ignoring, counted=recorded_frames(tracks), **options)
+        if ignoring is not None:
+            check_classes([run.truth], ignoring)
     else:
-        of_tracks, of_truth = _of_each(tracks, options)
-        given = read_run(tracks, **of_tracks) if isinstance(tracks, (str, Path)) else tracks
-        tables, objects = tables_of(given, kind, of_tracks), truth_of(truth, of_truth)
-        if classes is not None:
-            objects = restrict_classes(objects, classes)
-            check_classes([objects], classes)
-            tables = {name: restrict_tracks(table, classes, objects) for name, table in tables.items()}
+        tables, objects = tracks_and_truth(tracks, truth, kind, options)
+        if ignoring is not None:
+            objects = restrict_classes(objects, ignoring)
+            check_classes([objects], ignoring)
+            tables = {name: restrict_tracks(table, ignoring, objects) for name, table in tables.items()}
         run = JudgedRun("tracks", objects, tables.get("causal"), tables.get("smoothed"))
-    judged = judge_runs([run], outside=outside == "false")
+    by_themselves = classes_apart(rules, [run], classes, per_class)
+    judged = judge_runs([run], outside=outside == "false", protocol=rules, classes=by_themselves)
     for line in rows_beyond(judged, [run.name]):
         warnings.warn(f'{line} (outside="ignored" leaves them out)', InputWarning, stacklevel=2)
-    return {name: one.as_dict() for name, one in judged.items()}
-
-
-def _of_each(tracks: object, options: ReadingOptions) -> tuple[ReadingOptions, ReadingOptions]:
-    """Return the options of tracks and of truth: `first_frame` is that of tracks that are read."""
-    if isinstance(tracks, (str, Path)) or hasattr(tracks, "columns"):
-        return {**options, "time_unit": "s"}, {**options, "first_frame": None}
-    return options, options
+    found = {name: one.as_dict() for name, one in judged.items()}
+    for name, one in judged.items():
+        found |= {f"{name}/{kind}": scores.as_dict() for kind, scores in one.by_class.items()}
+        found |= {f"{name}/mean": dict(one.class_average())} if one.by_class else {}
+    return found
 
 
 def compare(
@@ -183,6 +187,7 @@ def compare(
     Raises:
         JeatGraphError: what a file or the configuration has wrong.
     """
+    from jeat_graph.api.together import recording_and_truth
     from jeat_graph.rig.common_picture import in_common
     from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
@@ -190,12 +195,14 @@ def compare(
     from jeat_graph.runs.measured import compare_run, track_measured
 
     how: ReadingOptions = {**options, "image": image}
-    recording = recording_of(detections, how)
+    if truth is None:
+        recording, objects = recording_of(detections, how), None
+    else:
+        recording, objects = recording_and_truth(detections, truth, how)
     recording, start, _ = in_common(recording, _settings(config, image, detections))
     recording, _, said = find_clocks(recording, start, "the detections")
     for line in said:
         warnings.warn(line, InputWarning, stacklevel=2)
-    objects = None if truth is None else truth_of(truth, how)
     settings = fit_input(start, recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
 
@@ -226,6 +233,7 @@ def calibrate(
     Raises:
         JeatGraphError: what a file or the data have wrong.
     """
+    from jeat_graph.api.together import recording_and_truth
     from jeat_graph.calibration.procedure import calibrate_with_truth, calibrate_without_truth
     from jeat_graph.rig.common_picture import in_common, with_ways_of, without_ways
     from jeat_graph.runs.clock_pass import with_clocks
@@ -234,19 +242,28 @@ def calibrate(
 
     how: ReadingOptions = {**options, "image": image}
     given = _settings(base, image, *as_list(detections))
-    recordings = [in_common(recording_of(one, how), given)[0] for one in as_list(detections)]
+    given_truths = None if truth is None else as_list(truth)
+    recordings = as_list(detections)
+    if given_truths is not None and len(given_truths) != len(recordings):
+        raise DataError(
+            f"{len(recordings)} recordings and {len(given_truths)} truths given; give one for each"
+        )
+    truths: list[GroundTruth] = []
+    if given_truths is None:
+        recordings = [recording_of(one, how) for one in recordings]
+    else:
+        read = [recording_and_truth(*pair, how) for pair in zip(recordings, given_truths, strict=True)]
+        recordings, truths = [one for one, _ in read], [one for _, one in read]
+    recordings = [in_common(one, given)[0] for one in recordings]
     names = [f"recording {k + 1}" for k in range(len(recordings))]
     start, said = with_clocks(recordings, without_ways(given), names)
     for line in said:
         warnings.warn(line, InputWarning, stacklevel=2)
     start = fit_input(start, *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]
-    if truth is None:
+    if given_truths is None:
         return with_ways_of(calibrate_without_truth(recordings, start).config, given)
 
-    truths = [truth_of(one, how) for one in as_list(truth)]
-    if len(truths) != len(recordings):
-        raise DataError(f"{len(recordings)} recordings and {len(truths)} truths given; give one for each")
     pairs = list(zip(recordings, truths, strict=True))
     return with_ways_of(calibrate_with_truth(pairs, start, tuned=tuned).config, given)
 

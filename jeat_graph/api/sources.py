@@ -94,6 +94,16 @@ def truth_of(truth: GroundTruth | pd.DataFrame | PathLike, options: ReadingOptio
     )
 
 
+def check_kind(kind: str) -> None:
+    """Refuse what is no kind of table.
+
+    Raises:
+        DataError: it is neither `causal` nor `smoothed`.
+    """
+    if kind not in ("causal", "smoothed"):
+        raise DataError(f"kind {kind!r}: must be causal or smoothed")
+
+
 def tables_of(
     tracks: Trajectories | Tracks | Run | pd.DataFrame, kind: str, options: ReadingOptions
 ) -> dict[str, Trajectories]:
@@ -105,8 +115,7 @@ def tables_of(
     if isinstance(tracks, (Tracks, Run)):
         both = {"causal": tracks.causal, "smoothed": tracks.smoothed}
         return {name: table for name, table in both.items() if table is not None}
-    if kind not in ("causal", "smoothed"):
-        raise DataError(f"kind {kind!r}: must be causal or smoothed")
+    check_kind(kind)
     if isinstance(tracks, Trajectories):
         return {kind: tracks}
     if hasattr(tracks, "columns"):

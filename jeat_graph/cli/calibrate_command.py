@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from jeat_graph.cli.options import add_config, add_image, add_reading, add_rig, reading, truth_read
+from jeat_graph.cli.options import add_config, add_image, add_reading, add_rig, reading, tables_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import ConfigError, DataError
@@ -60,8 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.config.reading import as_config, load_config
     from jeat_graph.io.files.atomic import check_writable
     from jeat_graph.io.files.config_io import save_config
-    from jeat_graph.io.tables.detections_io import read_many, split_name
-    from jeat_graph.io.tables.truth_io import read_truth
+    from jeat_graph.io.tables.detections_io import split_name
     from jeat_graph.rig.common_picture import in_common, with_ways_of, without_ways
     from jeat_graph.runs.beside import facts_beside, facts_of_frames
     from jeat_graph.runs.clock_pass import with_clocks
@@ -82,7 +81,8 @@ def run(args: argparse.Namespace) -> int:
     if shown is not None and args.rate is None and not any(facts_beside([path]) for path in files):
         args.rate = shown.rate_hz
     how = {**reading(args), "image": args.image or (None if shown is None else shown.size_px)}
-    read = [in_common(read_many([path], **how), given) for path in args.detections]
+    loaded = _read(args, how)
+    read = [in_common(one, given) for one, _ in loaded]
     for line in dict.fromkeys(line for _, _, notes in read for line in notes):
         say("calibrate", line)
     base, lines = with_clocks([one for one, _, _ in read], without_ways(base), args.detections)
@@ -93,8 +93,7 @@ def run(args: argparse.Namespace) -> int:
     picture = _picture_from(args, base, beside)
     base = with_image(base, recordings, args.image or (None if beside is None else beside.size_px))
     if args.gt:
-        truth_how: ReadingOptions = {**truth_read(args), "time_unit": args.time_unit, "image": how["image"]}
-        truths = [read_truth(path, **truth_how) for path in args.gt]
+        truths = [one for _, one in loaded if one is not None]
         pairs = list(zip(recordings, truths, strict=True))
         for path, pair in zip(args.gt, pairs, strict=True):
             _check_pair(path, *pair)
@@ -107,6 +106,18 @@ def run(args: argparse.Namespace) -> int:
     sys.stdout.write("\n".join(table.render("text") for table in summary(config, found)))
     print(f"written: {args.out}", file=sys.stderr)
     return 0
+
+
+def _read(args: argparse.Namespace, how: dict[str, Any]) -> list[tuple[Detections, GroundTruth | None]]:
+    """Read each recording, and with it its truth, the first frames of both decided together."""
+    from jeat_graph.io.tables.detections_io import read_many
+    from jeat_graph.io.tables.with_truth import read_with_truth
+
+    if not args.gt:
+        return [(read_many([path], **how), None) for path in args.detections]
+    like: ReadingOptions = {**tables_read(args), "time_unit": args.time_unit, "image": how["image"]}
+    pairs = zip(args.detections, args.gt, strict=True)
+    return [read_with_truth(path, truth, like, **how) for path, truth in pairs]
 
 
 def _check_pair(path: str, recording: Detections, truth: GroundTruth) -> None:

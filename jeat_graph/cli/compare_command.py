@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from jeat_graph.cli.options import add_tables, truth_read
+from jeat_graph.cli.options import add_tables, tables_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import warn
 from jeat_graph.config.argument_types import not_negative
@@ -60,9 +60,9 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.eval.road_compare import road_truth_beside, with_road
     from jeat_graph.eval.tables import to_json
     from jeat_graph.io.files.atomic import check_writable, open_atomic
-    from jeat_graph.io.tables.truth_io import read_truth
     from jeat_graph.runs.beside import rate_of_truth
     from jeat_graph.runs.measured import compare_run, measured_run
+    from jeat_graph.runs.run_truth import read_truth_of_run
 
     folder = Path(args.run_directory)
     if folder.is_file():
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     truth = None
     if args.gt is not None:
         args.rate = rate_of_truth(folder, args.gt, args.rate)
-        truth = read_truth(args.gt, **truth_read(args))
+        truth = read_truth_of_run(args.gt, folder, **tables_read(args))
     if truth is not None and truth.motion is None:
         warn("compare", f"{args.gt} has no motion (x, y, vx, vy, ax, ay): positions are judged, by its boxes")
     with stages("compare", 2) as stage:

@@ -9,18 +9,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.cli.options import add_classes, add_tables, add_time_unit, tables_read, truth_read
+from jeat_graph.cli.options import add_classes, add_tables, add_time_unit, tables_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive, share
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
+from jeat_graph.eval.protocols.plain import PROTOCOL as PLAIN
+from jeat_graph.eval.protocols.registry import protocol_named, protocols
 
 if TYPE_CHECKING:
     from jeat_graph.data.tables.reading import ReadingOptions
     from jeat_graph.data.trajectories import GroundTruth
     from jeat_graph.eval.judge import Judgement
     from jeat_graph.eval.load import JudgedRun
+    from jeat_graph.eval.protocols.record import JudgingProtocol
     from jeat_graph.eval.tables import Table
 
 WRITES = ("json",)
@@ -61,6 +64,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_classes(
         parser,
         "evaluate objects of these classes only; other objects, and tracks of another class, are ignored",
+    )
+    add(
+        "--protocol",
+        choices=[one.name for one in protocols()],
+        default=PLAIN.name,
+        help="rules of what is ignored: those of this program (plain), or those of the challenges, equal to "
+        "TrackEval's",
+    )
+    add(
+        "--per-class",
+        action="store_true",
+        help="evaluate each class by itself, a track by its own class, and print a row for each class and "
+        "their mean",
     )
     add_tables(parser)
     add_time_unit(parser, " of --gt and --detections; RUN is in seconds")
@@ -104,10 +120,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Judge, and print or write the result."""
-    from jeat_graph.eval.judge import summary_of_runs, summary_table
+    from jeat_graph.eval.judge import class_table, classes_apart, summary_of_runs, summary_table
     from jeat_graph.eval.tables import to_json
 
     names = _names(args.runs, args.gt)
+    protocol = protocol_named(args.protocol)
     with stages("eval", 2 + args.breakdown + bool(args.detections)) as stage:
         stage("reading")
         runs = _read(args)
@@ -115,11 +132,16 @@ def run(args: argparse.Namespace) -> int:
         # With one truth the runs are trackers on one recording: each is judged by itself.
         apart = len(names) > 1
         groups = {name: [run] for name, run in zip(names, runs, strict=True)} if apart else {names[0]: runs}
-        judged = {name: _judge(args, group) for name, group in groups.items()}
+        classes = classes_apart(protocol, runs, args.classes, args.per_class)
+        judged = {name: _judge(args, group, protocol, classes) for name, group in groups.items()}
         tables = [summary_of_runs(judged) if apart else summary_table(judged[names[0]])]
         scores: dict[str, dict[str, object]] = {
-            name: {kind: one.as_dict() for kind, one in kinds.items()} for name, kinds in judged.items()
+            name: {kind: _as_written(one) for kind, one in kinds.items()} for name, kinds in judged.items()
         }
+        if len(classes) > 1 or args.per_class:
+            each = [class_table(kinds) for kinds in judged.values()]
+            pairs = zip(judged, each, strict=True)
+            tables += [replace(one, title=f"{name}: {one.title}") for name, one in pairs] if apart else each
         if args.breakdown:
             stage("breakdown")
             for name, kinds in judged.items():
@@ -139,6 +161,8 @@ def run(args: argparse.Namespace) -> int:
             result["detections"] = values
     for name, group in groups.items():
         _say_caveats(judged[name], group)
+    if protocol is PLAIN and args.classes is None and not args.per_class:
+        _say_rules(runs)
     if args.json is not None:
         _write(args.json, to_json(result))
     if args.json != "-":
@@ -173,20 +197,33 @@ def _names(runs: Sequence[str], truths: Sequence[str]) -> list[str]:
 def _read(args: argparse.Namespace) -> list[JudgedRun]:
     """Read each run with its truth, or with the one of all."""
     from jeat_graph.eval.load import check_classes, load_run
-    from jeat_graph.runs.beside import rate_of_truth
+    from jeat_graph.runs.beside import rate_of_truth, recorded_frames
 
     truths = args.gt * len(args.runs) if len(args.gt) == 1 else args.gt
+    # Classes that are judged by themselves are told apart frame by frame, by the rules of the protocol.
+    ignoring = None if args.per_class or protocol_named(args.protocol).classes else args.classes
     runs = []
     for path, truth in with_progress(list(zip(args.runs, truths, strict=True))):
         how: ReadingOptions = {**tables_read(args), "time_unit": args.time_unit}
         how["rate_hz"] = rate_of_truth(path, truth, args.rate)
-        runs.append(load_run(path, truth, classes=args.classes, **how))
-    if args.classes is not None:
+        runs.append(load_run(path, truth, classes=ignoring, counted=recorded_frames(path), **how))
+    if ignoring is not None:
         check_classes([one.truth for one in runs], args.classes)
     return runs
 
 
-def _judge(args: argparse.Namespace, runs: Sequence[JudgedRun]) -> dict[str, Judgement]:
+def _as_written(one: Judgement) -> dict[str, object]:
+    """Scores and errors of one kind of table as JSON has them, with those of each class."""
+    found: dict[str, object] = dict(one.as_dict())
+    if one.by_class:
+        found["classes"] = {name: scores.as_dict() for name, scores in one.by_class.items()}
+        found["class_average"] = one.class_average()
+    return found
+
+
+def _judge(
+    args: argparse.Namespace, runs: Sequence[JudgedRun], protocol: JudgingProtocol, classes: Sequence[str]
+) -> dict[str, Judgement]:
     from jeat_graph.eval.judge import judge_runs
     from jeat_graph.eval.resampling import MAX_AGE_S
 
@@ -196,6 +233,8 @@ def _judge(args: argparse.Namespace, runs: Sequence[JudgedRun]) -> dict[str, Jud
         max_age_s=MAX_AGE_S if args.max_age is None else args.max_age,
         max_gap_s=args.max_gap,
         outside=args.outside == "false",
+        protocol=protocol,
+        classes=classes,
     )
 
 
@@ -215,6 +254,17 @@ def _say_caveats(judged: dict[str, Judgement], runs: Sequence[JudgedRun]) -> Non
     if len(set(behind.values())) > 1:
         counts = ", ".join(f"{kind} {count}" for kind, count in behind.items())
         say("eval", f"the rows pool different RUNs, so compare them with care: {counts}")
+
+
+def _say_rules(runs: Sequence[JudgedRun]) -> None:
+    """Say by which rules was judged, where the truth looks like that of a challenge with rules of its own."""
+    fitting = [one.name for one in protocols() if all(one.suits(run.truth) for run in runs)]
+    if fitting:
+        say(
+            "eval",
+            f"judged by the rules of this program, not by those of the challenge that the truth looks like "
+            f"(--protocol {' or '.join(fitting)})",
+        )
 
 
 def _on_the_road(args: argparse.Namespace) -> tuple[Table, dict[str, dict[str, float | int]]]:
@@ -239,15 +289,19 @@ def _detections(
 ) -> tuple[Table, dict[str, dict[str, float | int]]]:
     from jeat_graph.eval.detection_ap import detection_ap
     from jeat_graph.eval.tables import Cell, Table
-    from jeat_graph.io.tables.detections_io import read_many
+    from jeat_graph.io.tables.with_truth import read_with_truth
 
     if len(args.detections) != len(truths):
         raise DataError(
             f"{len(truths)} --gt and {len(args.detections)} --detections given; give one for each"
         )
-    how: ReadingOptions = {**truth_read(args), "time_unit": args.time_unit}
-    detections = [read_many([path], **how) for path in args.detections]
-    found = detection_ap(list(zip(truths, detections, strict=True)))
+    how: ReadingOptions = {**tables_read(args), "time_unit": args.time_unit}
+    # The truth is read again: it counts as the detections do here, and as the run above.
+    pairs = zip(args.detections, args.gt, truths, strict=True)
+    read = [(*read_with_truth(path, truth, how, **how), judged) for path, truth, judged in pairs]
+    found = detection_ap(
+        [(replace(own, ignore=judged.ignore), detections) for detections, own, judged in read]
+    )
     values = {sensor: one.as_dict() for sensor, one in found.items()}
     records: list[dict[str, Cell]] = [{"sensor": sensor, **one} for sensor, one in values.items()]
     return Table.from_records(records, title="Detections"), values

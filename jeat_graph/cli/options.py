@@ -26,9 +26,8 @@ from jeat_graph.data.secrets import without_logins
 from jeat_graph.data.tables.frame_filling import SCORE_SCALES
 from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.time_units import TIME_UNITS
-from jeat_graph.io.tables.formats import FORMATS
-
-OUTPUT_FORMATS = ("csv", "parquet", "motchallenge", "kitti")
+from jeat_graph.io.formats.csv_table import FORMAT as CSV
+from jeat_graph.io.formats.registry import format_names, written_formats
 
 
 class Parser(argparse.ArgumentParser):
@@ -147,11 +146,6 @@ def frames_read(args: argparse.Namespace) -> ReadingOptions:
     return {"rate_hz": args.rate, "first_frame": args.first_frame, "video": args.only_video}
 
 
-def truth_read(args: argparse.Namespace) -> ReadingOptions:
-    """Return what `add_tables` declared, for truth: its first frame is not the run's."""
-    return {**tables_read(args), "first_frame": None}
-
-
 def add_output_rate(parser: argparse.ArgumentParser, text: str, *old_names: str) -> None:
     """Declare `--output-rate`, the frame rate of what is written.
 
@@ -191,7 +185,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     """Declare how files of detections are read: `reading` takes them from the parsed arguments."""
     add = parser.add_argument
     add_counting(parser)
-    add("--input-format", choices=FORMATS, help="format of the input, if it is not recognised")
+    add("--input-format", choices=format_names(), help="format of the input, if it is not recognised")
     add("--images", metavar="FILE", help="COCO data set with the images and times of COCO results")
     add_columns(parser)
 
@@ -255,15 +249,17 @@ def add_smoother(parser: argparse.ArgumentParser) -> None:
 def add_formats(parser: argparse.ArgumentParser) -> None:
     """Declare `--format` of a run's tables and `--diagnostics`."""
     add = parser.add_argument
+    written = written_formats()
+    others = ", ".join(one.name for one in written if one is not CSV)
     add(
         "--format",
         dest="formats",
         nargs="+",
         action="extend",
         default=[],
-        choices=OUTPUT_FORMATS,
+        choices=[one.name for one in written],
         metavar="NAME",
-        help="also write the tables as parquet, motchallenge, kitti (csv is always written)",
+        help=f"also write the tables as {others} (csv is always written)",
     )
     add(
         "--diagnostics",
@@ -275,7 +271,7 @@ def add_formats(parser: argparse.ArgumentParser) -> None:
 
 def extra_formats(args: argparse.Namespace) -> tuple[str, ...]:
     """Return the formats asked for beside CSV, each once."""
-    return tuple(dict.fromkeys(name for name in args.formats if name != "csv"))
+    return tuple(dict.fromkeys(name for name in args.formats if name != CSV.name))
 
 
 def overrides(args: argparse.Namespace) -> list[str]:

@@ -175,7 +175,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _counted(request: Request) -> bool:
     """Whether anything that is read may count frames: pictures, or a result or truth without times."""
-    from jeat_graph.io.tables.formats import counts_frames
+    from jeat_graph.io.formats.registry import counts_frames
 
     files = [path for path in (request.run, request.truth) if path is not None and path.is_file()]
     return request.frames is not None or any(map(counts_frames, files))

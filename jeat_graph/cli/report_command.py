@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.options import add_tables, tables_read, truth_read
+from jeat_graph.cli.options import add_tables, tables_read
 from jeat_graph.cli.progress import stages
 from jeat_graph.cli.terminal import say
 from jeat_graph.data.progress import progress_span
@@ -75,8 +75,8 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
     from jeat_graph.data.errors import DataError
     from jeat_graph.drawing.page.figures import compared_run
     from jeat_graph.eval.road_compare import road_truth_beside, with_road
-    from jeat_graph.io.tables.truth_io import read_truth
     from jeat_graph.runs.measured import compare_run, measured_run
+    from jeat_graph.runs.run_truth import read_truth_of_run
 
     folder = Path(args.run_directory)
     if not folder.is_dir():
@@ -88,7 +88,7 @@ def _compare(args: argparse.Namespace) -> tuple[ComparedRun | None, str | None]:
         if args.detections is not None:
             raise
         return None, f"Filter against smoother is not shown: {error}."
-    truth = None if args.gt is None else read_truth(args.gt, **truth_read(args))
+    truth = None if args.gt is None else read_truth_of_run(args.gt, folder, **tables_read(args))
     with progress_span(0.3, 0.8):
         comparison = with_road(compare_run(measured, truth), folder, road_truth_beside(folder, args.gt))
     with progress_span(0.8, 1.0):

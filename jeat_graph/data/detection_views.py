@@ -12,8 +12,7 @@ from jeat_graph.data.camera_motion import CAMERA_MOTION
 from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR
 from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.interop import boxes_of
-from jeat_graph.data.tables.detection_table import OPTIONAL, REQUIRED, DetectionRows, rows_of_detections
-from jeat_graph.data.tables.frame_table import table_of_frame
+from jeat_graph.data.tables.detection_table import DetectionRows, rows_of_frame
 from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.to_supervision import supervision_of
 
@@ -97,10 +96,7 @@ class DetectionViews:
         Raises:
             DataError: a column is missing, or a row (from 0) is no detection; the message names it.
         """
-        table, how = table_of_frame(frame, REQUIRED, OPTIONAL, "detections"), Reading(**options)
-        return cls.from_table(
-            rows_of_detections(table, how, how.listed_classes(), None if "sensor" in table else sensor)
-        )
+        return cls.from_table(rows_of_frame(frame, Reading(**options), sensor))
 
     @classmethod
     def from_supervision(cls, source: Any, *, t: float, sensor: str = "rgb") -> Detections:

@@ -172,6 +172,8 @@ class GroundTruth:
         classes: (N,) class names, or None.
         distance: (N,) distance from the camera (m), or None.
         frames: (T,) all the times at which truth was recorded, also those without any object.
+        truncation: (N,) how far the picture's edge cuts the object: 0 not at all (KITTI's numbers), or None.
+        occlusion: (N,) how far others hide it: 0 not at all, 3 unknown (KITTI's numbers), or None.
     """
 
     t: FloatArray
@@ -182,6 +184,8 @@ class GroundTruth:
     classes: TextArray | None = None
     distance: FloatArray | None = None
     frames: FloatArray | None = None
+    truncation: FloatArray | None = None
+    occlusion: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.t)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Unpack
 
+from jeat_graph.data.frame_numbers import FrameCount
 from jeat_graph.data.tables.frame_table import table_of_frame
 from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.tables.truth_table import OPTIONAL, REQUIRED, truth_of_table
@@ -22,7 +23,9 @@ def truth_of_frame(frame: Any, **options: Unpack[ReadingOptions]) -> GroundTruth
     Raises:
         DataError: a column is missing, or a row (from 0) is no object; the message names it.
     """
-    how = Reading(**options)
-    return truth_of_table(table_of_frame(frame, REQUIRED, OPTIONAL, "true boxes"), how, how.listed_classes())[
-        0
-    ]
+    return truth_of_frame_counted(frame, Reading(**options))[0]
+
+
+def truth_of_frame_counted(frame: Any, how: Reading) -> tuple[GroundTruth, FrameCount | None]:
+    """Read truth as `truth_of_frame` does, and tell the frame numbers of one that counts frames."""
+    return truth_of_table(table_of_frame(frame, REQUIRED, OPTIONAL, "true boxes"), how, how.listed_classes())

@@ -130,7 +130,7 @@ class TrajectoryViews:
             DataError: a column is missing, or a row (from 0) is no track, or there twice.
         """
         how = Reading(**options)
-        return cls(**fields_of_frame(frame, how, how.listed_classes()))
+        return cls(**fields_of_frame(frame, how, how.listed_classes())[0])
 
     def to_supervision(self, *, own: bool = True) -> Any:
         """Return `supervision.Detections` with `tracker_id`, for its annotators.

@@ -186,6 +186,7 @@ def _with_truth(
 ) -> tuple[dict[str, JudgedRun], list[Outcome]]:
     """Read the runs that have truth; one whose truth does not fit becomes a failure."""
     from jeat_graph.eval.load import load_run
+    from jeat_graph.runs.beside import recorded_frames
 
     runs: dict[str, JudgedRun] = {}
     out = []
@@ -193,7 +194,9 @@ def _with_truth(
         if recording.truth is not None and outcome.status != FAILED:
             try:
                 how: ReadingOptions = {"rate_hz": recording.rate_hz, **_of_truth(recording)}
-                runs[recording.name] = load_run(folder / RUNS / recording.name, recording.truth, **how)
+                run = folder / RUNS / recording.name
+                counted = recorded_frames(run)
+                runs[recording.name] = load_run(run, recording.truth, counted=counted, **how)
             except (JeatGraphError, OSError) as error:
                 text = "tracked, but not judged: " + " ".join(str(error).split())
                 outcome = Outcome(outcome.name, FAILED, outcome.counts, outcome.warnings, text)

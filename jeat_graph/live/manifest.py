@@ -15,7 +15,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import FIRST_FRAMES
 from jeat_graph.data.tables.frame_filling import SCORE_SCALES
 from jeat_graph.data.time_units import TIME_UNITS
-from jeat_graph.io.tables.formats import FORMATS
+from jeat_graph.io.formats.registry import format_names
 
 #: Separates several files, or several settings, in one field.
 SEPARATOR = ";"
@@ -161,7 +161,7 @@ def _reading(said: Mapping[str, str], folder: Path, error: Callable[[str], DataE
         "first_frame": tuple(map(str, FIRST_FRAMES)),
         "time_unit": tuple(TIME_UNITS),
         "score_scale": SCORE_SCALES,
-        "input_format": FORMATS,
+        "input_format": format_names(),
     }
     for name, values in allowed.items():
         text = said.get(name)

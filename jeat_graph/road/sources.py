@@ -12,8 +12,8 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.eval.load import recording_span
+from jeat_graph.io.formats.registry import is_folder_of_boxes
 from jeat_graph.io.tables.trajectories_io import read_trajectories
-from jeat_graph.io.tables.yolo_labels import is_label_folder
 from jeat_graph.road.box_rows import BoxConfig
 from jeat_graph.road.boxes_road import TrackBoxes, boxes_of_table
 from jeat_graph.road.camera import RoadCamera
@@ -136,7 +136,7 @@ def run_table(source: str | Path) -> Path:
         DataError: a folder without a table of a run.
     """
     path = Path(source)
-    if not path.is_dir() or is_label_folder(path):
+    if not path.is_dir() or is_folder_of_boxes(path):
         return path
     found = next((path / name for name in _RUN_TABLES if (path / name).is_file()), None)
     if found is None:

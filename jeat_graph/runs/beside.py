@@ -12,6 +12,7 @@ from typing import NamedTuple
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import FrameCount
 from jeat_graph.runs.directory import read_record
 
 # Rates of two files of one recording may differ in their last digits: 29.97 and 30 do not, 25 and 30 do.
@@ -45,18 +46,18 @@ def facts_of_frames(frames: str | Path) -> Facts:
 
 
 def facts_beside(paths: Sequence[str | Path]) -> Facts | None:
-    """Return what `seqinfo.ini` beside MOTChallenge files says; None without one, or where two disagree.
+    """Return what files beside those of a format say, as `seqinfo.ini` does; None where two disagree.
 
     Raises:
         DataError: a file cannot be read.
     """
-    from jeat_graph.io.tables.formats import recognise
-    from jeat_graph.io.tables.motchallenge import sequence_info
+    from jeat_graph.io.formats.registry import recognise
 
     found = []
     for path in paths:
-        if recognise(path) == "motchallenge":
-            info = sequence_info(path)
+        facts = recognise(path).facts
+        if facts is not None:
+            info = facts(path)
             if info.origin is not None:
                 found.append(Facts(info.size_px, info.rate_hz, str(info.origin)))
     if not found or any(one[:2] != found[0][:2] for one in found):
@@ -101,10 +102,10 @@ def rate_of_truth(run: str | Path, truth: str | Path, rate_hz: float | None) -> 
     Raises:
         DataError: the user's rate is not that of `seqinfo.ini` beside the truth, or of the run's input.
     """
-    from jeat_graph.io.tables.formats import counts_frames, recognise
+    from jeat_graph.io.formats.registry import recognise
 
     kind = recognise(truth)
-    counts = kind != "kitti" and counts_frames(truth, kind)
+    counts = kind.rate_hz is None and kind.counts_frames(truth)
     known = facts_beside([truth]) if counts else None
     recorded = recorded_rate(run)
     if rate_hz is None:
@@ -124,6 +125,18 @@ def recorded_rate(run: str | Path) -> float | None:
     except (DataError, KeyError, TypeError):
         return None
     return float(rate) if isinstance(rate, int | float) and rate > 0.0 else None
+
+
+def recorded_frames(run: str | Path) -> FrameCount | None:
+    """Return the frame numbers of a run's input, None where it had times, or that is not known."""
+    try:
+        found = read_record(Path(run))["frames"]
+        numbers = [found[key] for key in ("first", "lowest", "highest")]
+    except (DataError, KeyError, TypeError):
+        return None
+    if not all(isinstance(number, int) for number in numbers):
+        return None
+    return FrameCount(*numbers, fixed=found.get("fixed") is True)
 
 
 def recorded_size(run: str | Path) -> tuple[int, int] | None:

@@ -15,6 +15,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.io.files.beside import check_beside
 from jeat_graph.io.files.locking import hold_folder, remove_folders
 from jeat_graph.io.files.outputs import check_folder
+from jeat_graph.io.formats.registry import written_formats
 from jeat_graph.io.tables.scans_io import SCANS
 
 RUN_JSON = "run.json"
@@ -27,6 +28,7 @@ _KINDS: dict[str, type[Any]] = {
     "config": dict,
     "counts": dict,
     "files": dict,
+    "frames": dict,
     "images": dict,
     "inputs": list,
     "learnt": dict,
@@ -40,7 +42,7 @@ DIAGNOSTICS = "diagnostics.csv"
 MEASUREMENTS = "measurements.parquet"
 ROAD_CAUSAL, ROAD_SMOOTHED = "road_causal.csv", "road_smoothed.csv"
 TABLES = ("causal", "smoothed")
-SUFFIXES = {"csv": ".csv", "parquet": ".parquet", "motchallenge": ".mot.txt", "kitti": ".kitti.txt"}
+SUFFIXES = {one.name: one.suffix for one in written_formats()}
 _TABLE_FILES = (kind + suffix for kind in TABLES for suffix in SUFFIXES.values())
 RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON)
 

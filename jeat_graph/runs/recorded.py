@@ -16,6 +16,7 @@ from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.eval.judge import Judgement
 from jeat_graph.io.files.beside import check_beside
+from jeat_graph.runs.beside import recorded_frames
 from jeat_graph.runs.directory import DIAGNOSTICS, read_record
 
 
@@ -96,7 +97,7 @@ def load_run_data(
     judged: dict[str, Judgement] = {}
     if truth is not None:
         with progress_span(0.0, 0.4):
-            one = load_run(run, truth, **options)
+            one = load_run(run, truth, counted=recorded_frames(run), **options)
         with progress_span(0.4, 1.0):
             judged = judge_runs([one])
         causal, smoothed = one.causal, one.smoothed

@@ -9,9 +9,10 @@ from typing import Any
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.io.tables.formats import BY_FRAME
+from jeat_graph.io.formats.csv_table import FORMAT as CSV
+from jeat_graph.io.formats.registry import written_formats
 
-EXTRA_FORMATS = ("parquet", *BY_FRAME)
+EXTRA_FORMATS = tuple(one.name for one in written_formats() if one is not CSV)
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,9 @@ from jeat_graph.data.errors import ConfigError, InputWarning
 from jeat_graph.data.json_numbers import nan_as_null
 from jeat_graph.data.progress import refreshing
 from jeat_graph.io.files.piecewise import PiecewiseWriter
-from jeat_graph.io.tables.formats import BY_FRAME
-from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, SUFFIXES, RunDirectory
+from jeat_graph.io.formats.csv_table import FORMAT as CSV
+from jeat_graph.io.formats.registry import written_formats
+from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, RunDirectory
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.damage import refusing_damage
@@ -216,7 +217,8 @@ class _Files(ExitStack):
         from jeat_graph.io.tables.trajectories_io import TrajectoryWriter
 
         super().__init__()
-        suffixes = [SUFFIXES[name] for name in ("csv", *options.formats) if name not in BY_FRAME]
+        named = {CSV.name, *options.formats}
+        suffixes = [one.suffix for one in written_formats() if one.is_table and one.name in named]
         kinds = ("causal", "smoothed") if config.smoother.engine != "none" else ("causal",)
         writers: dict[str, list[PiecewiseWriter | MeasurementWriter]] = {
             kind: [TrajectoryWriter(run.path(kind + suffix), classes=named) for suffix in suffixes]

@@ -183,8 +183,8 @@ def track_files(
     Raises:
         JeatGraphError: the configuration or a file is not valid, or they do not fit together.
     """
-    from jeat_graph.io.tables.detections_io import of_class_in, read_many
-    from jeat_graph.io.tables.formats import recognise
+    from jeat_graph.io.formats.registry import recognise
+    from jeat_graph.io.tables.detections_io import of_class_in, read_many_counted
     from jeat_graph.rig.common_picture import in_common, recorded_ways
     from jeat_graph.runs.clock_pass import find_clocks
     from jeat_graph.runs.declaring import fit_input
@@ -197,13 +197,13 @@ def track_files(
     check_distinct(request.detections)
     directory = RunDirectory(request.out, inputs=request.files)
     request = request.with_facts()[0]
-    if config.input.picture == "given" and any(recognise(path) == "yolo" for path in request.files):
+    if config.input.picture == "given" and any(recognise(path).in_shares for path in request.files):
         request = replace(request, image=(config.image.width, config.image.height))
     for note in notes:
         say(note)
     how = request._reading()
     classes = how.pop("classes", None)
-    detections = read_many(request.detections, **how)
+    detections, counted = read_many_counted(request.detections, **how)
     names = " + ".join(request.files)
     ways = {name: one for name, one in recorded_ways(config).items() if name in detections.sensors}
     detections, config, notes = in_common(detections, config)
@@ -220,6 +220,8 @@ def track_files(
         detections = of_class_in(detections, classes, request.files[0])
     found = {"ways": ways, "clocks": clocks}
     source = request.source() | {name: one for name, one in found.items() if one}
+    if counted is not None:
+        source["frames"] = {key: getattr(counted, key) for key in ("first", "lowest", "highest", "fixed")}
     record = RunRecord(source=source, warnings=check_detections(detections, config, names))
     for warning in record.warnings:
         warn(warning)

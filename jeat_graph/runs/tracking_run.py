@@ -11,9 +11,10 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.eval.frames import Kind
-from jeat_graph.io.tables.formats import BY_FRAME
+from jeat_graph.io.formats.csv_table import FORMAT as CSV
+from jeat_graph.io.formats.registry import written_formats
 from jeat_graph.io.tables.scans_io import SCANS, write_scans
-from jeat_graph.runs.directory import RUN_JSON, SUFFIXES, RunDirectory
+from jeat_graph.runs.directory import RUN_JSON, RunDirectory
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.run_steps import RunSteps
 from jeat_graph.tracking.input_watch import outside_counted
@@ -55,17 +56,16 @@ def _write_at_frames(
     run: RunDirectory, kind: Kind, instants: FloatArray, rate_hz: float, formats: Sequence[str]
 ) -> None:
     """Write a table at the frames of formats that count them: from its CSV, as anybody would later."""
-    from jeat_graph.io.exports.frame_results import write_kitti, write_motchallenge
     from jeat_graph.io.tables.trajectories_io import read_trajectories
     from jeat_graph.runs.frame_export import at_frames
 
-    wanted = [name for name in formats if name in BY_FRAME]
+    wanted = [one for one in written_formats() if one.name in formats and one.write is not None]
     if not wanted:
         return
-    table = at_frames(read_trajectories(run.path(kind + SUFFIXES["csv"])), kind, instants, rate_hz)
-    for name in wanted:
-        write = write_motchallenge if name == "motchallenge" else write_kitti
-        write(table, run.path(kind + SUFFIXES[name]), rate_hz)
+    table = at_frames(read_trajectories(run.path(kind + CSV.suffix)), kind, instants, rate_hz)
+    for one in wanted:
+        if one.write is not None:
+            one.write(table, run.path(kind + one.suffix), rate_hz)
 
 
 def _frame_rate(detections: Detections, config: Config, options: RunOptions) -> float:

@@ -59,7 +59,7 @@ PUBLIC = {
     "jeat_graph.io.events.dsec_hdf5",
     "jeat_graph.io.events.indexed",
     "jeat_graph.io.events.opening",
-    "jeat_graph.io.tables.prophesee",
+    "jeat_graph.io.formats.prophesee",
     "jeat_graph.io.events.dsec_writer",
     "jeat_graph.io.files.hashing",
     "jeat_graph.io.files.locking",

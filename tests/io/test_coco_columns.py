@@ -9,8 +9,8 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.tables.reading import Reading
+from jeat_graph.io.formats.coco import read_results
 from jeat_graph.io.tables import coco_columns
-from jeat_graph.io.tables.coco import read_results
 from jeat_graph.io.tables.coco_columns import read_entries
 
 GOOD = {"image_id": 3, "bbox": [1, 2.5, 1e-3, 40], "score": 0.25, "category_id": 2}

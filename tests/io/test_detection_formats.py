@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.io.formats.registry import recognise
 from jeat_graph.io.tables.detections_io import read_detections
-from jeat_graph.io.tables.formats import recognise
 
 MOT = "1,-1,10,20,30,40,0.9,-1,-1,-1\n4,-1,11,21,31,41,0.8,-1,-1,-1\n"
 KITTI = (
@@ -295,18 +295,18 @@ class TestRecognition:
         ],
     )
     def test_the_format_is_told_by_content_and_name(self, write, name, content, expected):
-        assert recognise(write(name, content)) == expected
+        assert recognise(write(name, content)).name == expected
 
     def test_the_caller_knows_better(self, write):
-        assert recognise(write("a.csv", MOT), "motchallenge") == "motchallenge"
+        assert recognise(write("a.csv", MOT), "motchallenge").name == "motchallenge"
 
     @pytest.mark.parametrize(
         "line", ["2 0.5 0.4 0.1 0.05", "2 0.5 0.4 0.1 0.05 0.91", "0 0.523438 1 0.013 0.99 0.8 17"]
     )
     def test_labels_of_yolo_are_named(self, write, line):
         with pytest.raises(DataError, match="1: looks like labels of YOLO"):
-            recognise(write("a.txt", f"{line}\n{line}\n"))
-        assert recognise(write("b.txt", "1 -1 1 1 1 1 1\n")) == "motchallenge"
+            read_detections(write("a.txt", f"{line}\n{line}\n"), rate_hz=1)
+        assert recognise(write("b.txt", "1 -1 1 1 1 1 1\n")).name == "motchallenge"
 
     def test_a_format_that_makes_no_sense_is_refused(self, write):
         with pytest.raises(DataError, match="unknown format 'voc'; known: csv"):

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.exports.frame_results import write_kitti, write_motchallenge
+from jeat_graph.io.formats.kitti import write_kitti
+from jeat_graph.io.formats.motchallenge import write_motchallenge
 from jeat_graph.io.tables.trajectories_io import (
     COLUMNS,
     TrajectoryWriter,
@@ -276,6 +277,6 @@ class TestKitti:
 
 @pytest.mark.parametrize("name", ["x.mot.txt", "x.TXT"])
 def test_a_name_of_text_by_frame_is_not_filled_with_csv(name, tmp_path):
-    with pytest.raises(DataError, match="write_motchallenge"):
+    with pytest.raises(DataError, match=r"written_formats\(\)"):
         write_trajectories(Trajectories.empty(), tmp_path / name)
     assert not list(tmp_path.iterdir())

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.tables.detections_io import read_detections, read_many
-from jeat_graph.io.tables.formats import recognise
 from jeat_graph.io.tables.trajectories_io import read_trajectories
 from jeat_graph.io.tables.truth_io import read_truth
 
@@ -393,7 +392,7 @@ class TestYoloLabels:
 
     def test_one_file_alone_is_told_to_come_as_a_folder(self, folder):
         with pytest.raises(DataError, match=r"looks like labels of YOLO .* give the folder"):
-            recognise(folder / "night_1.txt")
+            read_detections(folder / "night_1.txt", rate_hz=1)
 
 
 class TestXml:

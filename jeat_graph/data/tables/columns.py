@@ -20,8 +20,7 @@ from jeat_graph.data.column_names import (
     standing_in,
 )
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_numbers import first_frame, split_picture_name
-from jeat_graph.data.notes import note
+from jeat_graph.data.frame_numbers import FrameCount, first_frame, split_picture_name
 from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.tables.reading import Reading
 from jeat_graph.data.tables.spreadsheets import is_number
@@ -45,6 +44,13 @@ class Times:
     t: FloatArray
     frames: IntArray | None = None
     first: int | None = None
+
+    @property
+    def count(self) -> FrameCount | None:
+        """The frame numbers, and the first; None where the rows have times."""
+        if self.frames is None or self.first is None:
+            return None
+        return FrameCount.of(self.frames, self.first, usual=0)
 
 
 def of_one_video(table: FileTable, how: Reading) -> FileTable:
@@ -100,8 +106,6 @@ def times_of(table: FileTable, how: Reading) -> Times:
                 "has frame numbers only; give their rate with --rate (in Python rate_hz)", table.path
             )
         return Times(np.zeros(0), frames, first)
-    if how.first_frame is None and first and len(frames):
-        note(f"{table.title}: frames count from 1, for there is no frame 0 (--first-frame 0 says otherwise)")
     return Times(np.asarray((frames - first) / check_rate(how.rate_hz, table.path)), frames, first)
 
 

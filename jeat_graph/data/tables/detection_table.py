@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,11 @@ from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR, standing_in
 from jeat_graph.data.embeddings import EmbeddingArray, find_bad_embedding, unit_embeddings
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.frame_numbers import FrameCount
 from jeat_graph.data.tables.columns import Times, boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.frame_filling import check_rate, fill_frames, scale_scores, score_hint
+from jeat_graph.data.tables.frame_table import table_of_frame
 from jeat_graph.data.tables.reading import Reading
 
 #: Columns that a table of detections needs, or others that can stand for them, and those that it may have.
@@ -38,7 +40,7 @@ class DetectionRows(NamedTuple):
         embeddings: (R, E), or None.
         camera_motion: (R, 11), NaN in rows that say nothing of it; or None.
         dropped: rows whose box has no area; they are among the empty ones.
-        first: number of the first frame where the table counts frames, else None.
+        frames: the frame numbers where the table counts frames, else None.
     """
 
     t: FloatArray
@@ -51,7 +53,7 @@ class DetectionRows(NamedTuple):
     embeddings: EmbeddingArray | None
     camera_motion: FloatArray | None
     dropped: int
-    first: int | None
+    frames: FrameCount | None
 
 
 def rows_of_detections(
@@ -94,10 +96,22 @@ def rows_of_detections(
     check_rows(boxes, scores, empty | flat, table.error)
     motions = read_motions(table) if CAMERA_MOTION in table else None
     rows = DetectionRows(
-        t, named, code, boxes, scores, classes, empty | flat, looks, motions, int(flat.sum()), times.first
+        t, named, code, boxes, scores, classes, empty | flat, looks, motions, int(flat.sum()), times.count
     )
     fills = times.frames is not None and "sensor" not in table and not empty.any() and how.fill_empty
     return _with_frames_between(rows, times, how, table) if fills and len(t) and looks is None else rows
+
+
+def rows_of_frame(frame: Any, how: Reading, sensor: str = DEFAULT_SENSOR) -> DetectionRows:
+    """Read the rows of a data frame, as `rows_of_detections` does those of a file.
+
+    Args:
+        frame: the data frame.
+        how: what it does not say itself.
+        sensor: name of the sensor where the frame has no such column.
+    """
+    table = table_of_frame(frame, REQUIRED, OPTIONAL, "detections")
+    return rows_of_detections(table, how, how.listed_classes(), None if "sensor" in table else sensor)
 
 
 def _with_frames_between(rows: DetectionRows, times: Times, how: Reading, table: FileTable) -> DetectionRows:

@@ -13,6 +13,7 @@ from jeat_graph.data.class_columns import class_column
 from jeat_graph.data.column_names import BOX, MEAN, SIZE_VAR, VAR, standing_in, usual_names
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE, labels_of
+from jeat_graph.data.frame_numbers import FrameCount
 from jeat_graph.data.tables.columns import boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.frame_table import table_of_frame
@@ -46,7 +47,7 @@ class ResultRows(NamedTuple):
         scores: (R,) as the table has them; 1 where it has none.
         classes: (R,) names, empty where unknown; or None.
         recorded: (T,) all times at which the table says that it was looked (s).
-        first: number of the first frame where the table counts frames, else None.
+        frames: the frame numbers where the table counts frames, else None.
     """
 
     rows: IntArray
@@ -56,7 +57,7 @@ class ResultRows(NamedTuple):
     scores: FloatArray
     classes: TextArray | None
     recorded: FloatArray
-    first: int | None
+    frames: FrameCount | None
 
 
 def is_result(names: Sequence[str]) -> bool:
@@ -94,7 +95,7 @@ def rows_of_result(table: FileTable, how: Reading, names: Mapping[int, str] | No
         np.where(np.isnan(scores), 1.0, scores)[rows],
         None if classes is None else classes[rows],
         np.unique(times.t),
-        times.first,
+        times.count,
     )
 
 
@@ -182,8 +183,12 @@ def check_tracks(error: Callable[[int, str], DataError], fields: Mapping[str, An
         raise error(row, f"track {ids[row]} is there twice at t = {t[row]:g}")
 
 
-def fields_of_frame(frame: Any, how: Reading, names: Mapping[int, str] | None) -> dict[str, Any]:
+def fields_of_frame(
+    frame: Any, how: Reading, names: Mapping[int, str] | None
+) -> tuple[dict[str, Any], FrameCount | None]:
     """Return the fields of `Trajectories` that a data frame says: a run's table, or another tracker's result.
+
+    With them come the frame numbers of one that counts frames.
 
     Args:
         frame: the data frame.
@@ -198,11 +203,11 @@ def fields_of_frame(frame: Any, how: Reading, names: Mapping[int, str] | None) -
         found = rows_of_result(table, how, names)
         fields = bare_fields(found.t, found.ids, found.boxes, found.scores, found.classes)
         check_tracks(lambda row, message: table.error(int(found.rows[row]), message), fields)
-        return fields
+        return fields, found.frames
     table = table_of_frame(frame, COLUMNS, MORE_COLUMNS, "trajectories")
     fields = run_fields(table)
     check_tracks(table.error, fields)
-    return fields
+    return fields, None
 
 
 def _stack(table: FileTable, names: Iterable[str]) -> FloatArray:

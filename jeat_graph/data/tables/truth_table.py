@@ -10,6 +10,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.column_names import BOX, standing_in
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.frame_numbers import FrameCount
 from jeat_graph.data.tables.columns import boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.reading import Reading
@@ -24,7 +25,7 @@ _TRUTH_WORDS = {"": False, "0": False, "1": True, "false": False, "true": True}
 
 def truth_of_table(
     table: FileTable, how: Reading, names: Mapping[int, str] | None
-) -> tuple[GroundTruth, int | None]:
+) -> tuple[GroundTruth, FrameCount | None]:
     """Read truth from a table.
 
     Args:
@@ -34,7 +35,7 @@ def truth_of_table(
         names: of classes by number, or None.
 
     Returns:
-        The truth, and the number of the first frame where the table counts frames.
+        The truth, and its frame numbers where the table counts frames.
 
     Raises:
         DataError: names the row and what is wrong.
@@ -70,7 +71,7 @@ def truth_of_table(
         distance=distance,
         frames=np.unique(all_t),
     )
-    return truth, times.first
+    return truth, times.count
 
 
 def _ignore_flags(table: FileTable) -> BoolArray:

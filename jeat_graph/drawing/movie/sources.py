@@ -119,7 +119,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
     from jeat_graph.io.events.frame_clock import FrameClock, events_later_us
     from jeat_graph.io.events.stretches import open_stretches
     from jeat_graph.io.tables.scans_io import read_instants
-    from jeat_graph.io.tables.truth_io import read_truth
+    from jeat_graph.runs.run_truth import read_truth_of_run
 
     tables, request = _resolve(request)
     frames = events = clock = None
@@ -132,8 +132,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         frames = VideoBackground(source)
     truth = None
     if request.truth is not None:
-        how: ReadingOptions = {**request.reading, "first_frame": None}  # it is said of the tracks
-        truth = read_truth(request.truth, **how)
+        truth = read_truth_of_run(request.truth, request.run or "", **request.reading)
     rate_hz = request.rate_hz or (median_rate_hz(frames.times_s) if frames else None) or DEFAULT_RATE_HZ
     if request.events is not None:
         window_s = request.window_s if request.window_s is not None else 1.0 / rate_hz

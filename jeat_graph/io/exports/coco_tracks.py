@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.exports.coco_writer import coco_annotations, coco_categories, coco_images, write_coco
-from jeat_graph.io.exports.frame_results import by_frame
+from jeat_graph.io.tables.by_frame import by_frame
 
 _US_PER_S = 1e6
 _VIDEO = 0

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.exports.frame_results import by_frame
 from jeat_graph.io.files.atomic import atomic_path
 from jeat_graph.io.files.zipped import LABELS, MEMBER
+from jeat_graph.io.tables.by_frame import by_frame
 
 _FIRST_FRAME = _FIRST_LABEL = 1
 # A fixed date: the same tracks give the same bytes.

@@ -16,8 +16,8 @@ import numpy as np
 
 from jeat_graph.data.arrays import TextArray
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.exports.frame_results import by_frame
 from jeat_graph.io.files.atomic import atomic_path
+from jeat_graph.io.tables.by_frame import by_frame
 from jeat_graph.version import __version__
 
 _FIRST_FRAME = 1

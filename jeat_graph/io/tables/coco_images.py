@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_numbers import first_frame
+from jeat_graph.data.frame_numbers import FrameCount, first_frame
 from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.tables.reading import Reading
 from jeat_graph.data.videos import choose_video
@@ -23,13 +23,13 @@ class Images(NamedTuple):
         time: when each was taken (s), by its id.
         known: ids of the images of all videos.
         by_name: id of each image by its file name and by that without folder and type.
-        first: number of the first image, or None where images have times of their own.
+        frames: numbers of the images, or None where these have times of their own.
     """
 
     time: dict[int, float]
     known: set[int]
     by_name: dict[str, int]
-    first: int | None
+    frames: FrameCount | None
 
 
 def read_images(tree: Mapping[str, Any], how: Reading, path: str | Path) -> Images | None:
@@ -59,8 +59,8 @@ def read_images(tree: Mapping[str, Any], how: Reading, path: str | Path) -> Imag
         by_name.setdefault(Path(name).stem, image["id"])
         by_name[name] = image["id"]
     own = _of_one_video(images, tree, how, path)
-    time, first = _times(own, how, path)
-    return Images(time, known, by_name, first)
+    time, frames = _times(own, how, path)
+    return Images(time, known, by_name, frames)
 
 
 def _of_one_video(
@@ -90,8 +90,8 @@ def _of_one_video(
 
 def _times(
     images: list[tuple[int, dict[str, Any]]], how: Reading, path: str | Path
-) -> tuple[dict[int, float], int | None]:
-    """Time (s) of each image by its id, and the number of the first where they count."""
+) -> tuple[dict[int, float], FrameCount | None]:
+    """Time (s) of each image by its id, and their numbers where they count."""
     stamped: dict[int, float] = {}
     counted: dict[int, float] = {}
     for k, image in images:
@@ -108,6 +108,8 @@ def _times(
             )
     if not counted:
         return stamped, None
-    first = first_frame(np.array(list(counted.values())), how.first_frame)
+    numbers = np.array(list(counted.values()))
+    first = first_frame(numbers, how.first_frame)
     rate = check_rate(how.rate_hz or 0.0, path)
-    return stamped | {number: (frame - first) / rate for number, frame in counted.items()}, first
+    times = {number: (frame - first) / rate for number, frame in counted.items()}
+    return stamped | times, FrameCount.of(numbers, first)

@@ -15,17 +15,18 @@ from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR, NUMBER_COLUMNS
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE
-from jeat_graph.data.notes import note
+from jeat_graph.data.frame_numbers import FrameCount, note_first
 from jeat_graph.data.tables.detection_table import OPTIONAL, rows_of_detections
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.frame_filling import scale_scores
 from jeat_graph.data.tables.reading import Reading, ReadingOptions
-from jeat_graph.io.tables.box_rows import read_rows
+from jeat_graph.data.together import Reader, read_together
+from jeat_graph.io.formats.registry import recognise
 from jeat_graph.io.tables.class_names import names_by_number
 from jeat_graph.io.tables.csv_text import NUMBER, WORD
 from jeat_graph.io.tables.detection_rows import assemble
 from jeat_graph.io.tables.file_tables import read_table
-from jeat_graph.io.tables.formats import counts_frames, known_columns, recognise
+from jeat_graph.io.tables.known_columns import known_columns, table_counts_frames
 from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.io.tables.sensor_columns import columns_of
 from jeat_graph.io.tables.table_writer import write_columns
@@ -35,7 +36,6 @@ _KINDS = {
     **dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER),
     **dict.fromkeys(("sensor", *ASIDE), WORD),
 }
-_TABLES = ("csv", "parquet")
 
 
 def read_detections(
@@ -47,7 +47,6 @@ def read_detections(
 ) -> Detections:
     """Read detections from a file of any known format.
 
-    ============  ==========================================================================================
     csv, parquet  `t, sensor, left, top, width, height[, score, class]`, rows in any order; a row with only
                   `t` and `sensor` is an empty scan. Usual other names are understood, see `column_names`;
                   other columns are passed over. `;` or tabs between fields, `.csv.gz`. A table that counts
@@ -60,12 +59,19 @@ def read_detections(
     coco          results or data set, JSON; times from `images`, else image_id by `rate_hz`.
     yolo          folder of labels, one file a picture; needs `image` and `rate_hz`.
     ============  ==========================================================================================
+    =======
+    The formats are those of `jeat_graph.io.formats`, each with a record that says what of it is read
+    (`docs/reference/formats.md`). A table (CSV, Parquet) has the columns `t, sensor, left, top, width,
+    height[, score, class]`, rows in any order; a row with only `t` and `sensor` is an empty scan. Usual other
+    names are understood, see `column_names`; other columns are passed over. A table that counts frames may
+    lack `sensor`. Columns `sensor.KEY` say what is known of the detector; `track` reads them, see
+    `sensor_columns`.
 
     A file without scores gives every box the score 1. Only tables can say that a scan found nothing. For the
     others, with `fill_empty`, frames between the first and the last that have no box become empty scans (to
-    the length in `seqinfo.ini`, if there is one; by `rate_hz` for `prophesee`, and only if it is given; all
-    listed images for `coco`); so do those of a table that counts frames and has neither `sensor` nor empty
-    scans.
+    the length in `seqinfo.ini`, if there is one; by `rate_hz` where a format has times of its own, and only
+    if it is given; all listed images of a COCO data set); so do those of a table that counts frames and has
+    neither `sensor` nor empty scans.
 
     Args:
         path: the file.
@@ -79,18 +85,21 @@ def read_detections(
     Raises:
         DataError: names the file, the line or row, and what is wrong.
     """
-    return _read_counted(path, sensor, fmt, Reading(**options))[0]
+    how = Reading(**options)
+    found, count = read_detections_counted(path, sensor, fmt, how)
+    note_first(str(path), count, how.first_frame)
+    return found
 
 
-def _read_counted(
+def read_detections_counted(
     path: str | Path, sensor: str | None, fmt: str | None, how: Reading
-) -> tuple[Detections, int | None]:
-    """Read detections, and tell the first frame's number where the file leaves it open."""
+) -> tuple[Detections, FrameCount | None]:
+    """Read detections as `read_detections` does, and tell the frame numbers of a file that counts frames."""
     kind = recognise(path, fmt)
-    if kind in _TABLES:
+    if kind.is_table:
         return _read_contract(path, sensor, how)
     name = DEFAULT_SENSOR if sensor is None else sensor
-    rows = read_rows(path, kind, how)
+    rows = kind.read_boxes(path, how)
     if rows.scores is None and rows.ignore is not None and rows.ignore.any():
         rows = rows.take(np.flatnonzero(~rows.ignore))  # truth, and what it does not judge is no detection
     missing = np.setdiff1d(rows.recorded(), rows.t) if how.fill_empty else np.zeros(0)
@@ -101,7 +110,7 @@ def _read_counted(
             path,
         )
     scores = np.ones(len(rows.t)) if rows.scores is None else scale_scores(rows.scores, how.score_scale, path)
-    return assemble(rows.t, name, rows.boxes, scores, rows.classes, missing, rows.error), rows.first
+    return assemble(rows.t, name, rows.boxes, scores, rows.classes, missing, rows.error), rows.frames
 
 
 def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
@@ -115,13 +124,47 @@ def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
     Raises:
         DataError: as `read_detections`; or two files whose format does not name sensors are not told apart.
     """
-    if not paths:
-        raise DataError("no detections file given")
     # The files of some sensors may have classes and others none: chosen when they are together.
     classes = options.pop("classes", None)
+    whole, _ = read_many_counted(paths, **options)
+    return whole if classes is None else of_class_in(whole, classes, split_name(paths[0])[1])
+
+
+def read_many_counted(paths: Sequence[str | Path], **options: Any) -> tuple[Detections, FrameCount | None]:
+    """Read several files as `read_many` does, of all classes, and tell the frame numbers of those that count.
+
+    Their first frame is that of the first file that counts frames, `fixed` unless it was a guess that there
+    is no frame 0.
+    """
+    said = options.get("first_frame")
+    parts, decided = read_together(detection_readers(paths, **options), said)
+    whole = parts[0] if len(parts) == 1 else Detections.concatenate(parts)
+    counts = [one for one in decided if one is not None]
+    if not counts:
+        return whole, None
+    first, lowest, highest = (
+        counts[0].first,
+        min(one.lowest for one in counts),
+        max(one.highest for one in counts),
+    )
+    return whole, FrameCount(first, lowest, highest, fixed=first == 0 or said is not None)
+
+
+def detection_readers(paths: Sequence[str | Path], **options: Any) -> list[Reader[Detections]]:
+    """Return a reader for each of several files of one scene.
+
+    Args:
+        paths: as `read_many` has them.
+        options: as `read_many`, without `classes`.
+
+    Raises:
+        DataError: two files whose format does not name sensors are not told apart.
+    """
+    if not paths:
+        raise DataError("no detections file given")
     fmt, sensor = options.pop("fmt", None), options.pop("sensor", None)
     how = Reading(**options)
-    found: list[tuple[Detections, int | None]] = []
+    files: list[tuple[str | Path, str | None]] = []
     unnamed: str | Path | None = None
     for item in paths:
         name, path = split_name(item)
@@ -130,26 +173,20 @@ def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
             if unnamed is not None:
                 raise DataError(f"does not name its sensor, nor does {unnamed}; give NAME=path", path)
             unnamed = path
-        found.append(_read_counted(path, name, fmt, how))
-    firsts = {first for _, first in found} - {None}
-    if len(firsts) > 1:
-        # Files of one scene count alike: one that begins later counts from 0 as those that have a frame 0 do.
-        note("frames count from 0 in all files, for one of them has a frame 0")
-        for k, (item, (_, first)) in enumerate(zip(paths, found, strict=True)):
-            if first == 1:
-                name, path = split_name(item)
-                found[k] = _read_counted(path, name or sensor, fmt, replace(how, first_frame=0))
-    parts = [one for one, _ in found]
-    whole = parts[0] if len(parts) == 1 else Detections.concatenate(parts)
-    return whole if classes is None else of_class_in(whole, classes, split_name(paths[0])[1])
+        files.append((path, name))
+
+    def reader(path: str | Path, name: str | None) -> Reader[Detections]:
+        return Reader(
+            str(path), lambda first: read_detections_counted(path, name, fmt, replace(how, first_frame=first))
+        )
+
+    return [reader(*file) for file in files]
 
 
 def _names_sensors(path: str | Path, fmt: str | None) -> bool:
     """Tell whether a file can say which sensor its boxes are of."""
     kind = recognise(path, fmt)
-    return kind in _TABLES and not (
-        counts_frames(path, kind) and "sensor" not in known_columns(path, _COLUMNS)
-    )
+    return kind.is_table and not (table_counts_frames(path) and "sensor" not in known_columns(path, _COLUMNS))
 
 
 def of_class_in(detections: Detections, classes: Sequence[str], path: str | Path) -> Detections:
@@ -195,18 +232,20 @@ def write_detections(
     write_columns(columns, path)
 
 
-def _read_contract(path: str | Path, sensor: str | None, how: Reading) -> tuple[Detections, int | None]:
+def _read_contract(
+    path: str | Path, sensor: str | None, how: Reading
+) -> tuple[Detections, FrameCount | None]:
     table = _table_of(path, sensor)
     names = names_by_number(how.class_names, path, LISTS_COUNT_FROM)
     rows = rows_of_detections(table, how, names, sensor)
     del table  # the file's own columns are in the way of what is to come
-    return Detections.from_table(rows), rows.first
+    return Detections.from_table(rows), rows.frames
 
 
 def _table_of(path: str | Path, sensor: str | None) -> FileTable:
     """Read a table; one that counts frames may lack the column `sensor`, as other formats do."""
     required = ["t", *(() if sensor is not None else ("sensor",)), *BOX]
-    if sensor is None and counts_frames(path, "csv"):
+    if sensor is None and table_counts_frames(path):
         required.remove("sensor")
     try:
         return read_table(path, required, OPTIONAL, short=("t", "sensor"), aliases=True, kinds=_KINDS)

@@ -13,7 +13,7 @@ from jeat_graph.data.tables.trajectory_table import (
     RESULT_COLUMNS,
     rows_of_result,
 )
-from jeat_graph.io.tables.box_rows import FileBoxes
+from jeat_graph.io.formats.record import FileBoxes
 from jeat_graph.io.tables.class_names import names_by_number
 from jeat_graph.io.tables.file_tables import read_table
 
@@ -39,5 +39,5 @@ def read_result_table(path: str | Path, how: Reading) -> FileBoxes:
         scores=found.scores,
         ids=found.ids,
         classes=found.classes,
-        first=found.first,
+        frames=found.frames,
     )

@@ -25,13 +25,13 @@ from jeat_graph.data.column_names import DEFAULT_SENSOR
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.frame_table import table_of_frame
+from jeat_graph.io.formats.registry import recognise
 from jeat_graph.io.tables.csv_text import WORD
 from jeat_graph.io.tables.file_tables import read_table
-from jeat_graph.io.tables.formats import known_columns, recognise
+from jeat_graph.io.tables.known_columns import known_columns
 
 #: Before the key of a sensor's setting, in the name of a column.
 PREFIX = "sensor."
-_TABLES = ("csv", "parquet")
 _SENSOR = "sensor"
 
 #: Settings by sensor and key, as `sensors` of a configuration has them.
@@ -65,7 +65,7 @@ def said_by(path: str | Path, sensor: str | None = None) -> Said:
         DataError: a sensor has two values of one setting, a value is none, or there is no such setting: names
             the file and the line.
     """
-    if recognise(path) not in _TABLES:
+    if not recognise(path).is_table:
         return {}
     wanted = [name for name in known_columns(path, (_SENSOR,)) if name.startswith(PREFIX)]
     if not wanted:

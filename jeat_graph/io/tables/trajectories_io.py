@@ -15,6 +15,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import unknown_classes
 from jeat_graph.data.column_names import BOX, MEAN, SIZE_VAR, VAR
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import FrameCount, note_first
 from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.tables.trajectory_table import (
     COLUMNS,
@@ -30,9 +31,10 @@ from jeat_graph.data.tables.trajectory_table import (
 )
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.files.piecewise import PiecewiseWriter
-from jeat_graph.io.tables.box_rows import FileBoxes, read_rows
+from jeat_graph.io.formats.record import FileBoxes
+from jeat_graph.io.formats.registry import recognise
 from jeat_graph.io.tables.file_tables import read_table
-from jeat_graph.io.tables.formats import known_columns, recognise
+from jeat_graph.io.tables.known_columns import known_columns
 from jeat_graph.io.tables.result_tables import read_result_table
 from jeat_graph.io.tables.rounding import round_decimals, round_significant
 from jeat_graph.io.tables.table_writer import TableWriter
@@ -42,7 +44,6 @@ PX_DECIMALS = 3
 EXISTENCE_DECIMALS = 6
 _VAR_DIGITS = 6
 _SCALE = np.repeat([10.0**PX_DECIMALS, 10.0**EXISTENCE_DECIMALS], [10, 1])
-_TABLES = ("csv", "parquet")
 # A file of white space only is no larger.
 _BLANK_BYTES = 100
 _FLUSH_ROWS = 8192
@@ -137,12 +138,12 @@ def write_trajectories(table: Trajectories, path: str | Path) -> None:
 
     Raises:
         DataError: the name ends in `.txt`, as results of MOTChallenge and KITTI do: these are written by
-            `jeat_graph.io.exports.frame_results`; or a sensor's name holds `|`.
+            the `write` of their records in `jeat_graph.io.formats`; or a sensor's name holds `|`.
     """
     if Path(path).suffix.lower() == ".txt":
         raise DataError(
-            "this writes CSV or Parquet; write_motchallenge and write_kitti of "
-            "jeat_graph.io.exports.frame_results write text by frame",
+            "this writes CSV or Parquet; text by frame is written by the `write` of a format, see "
+            "written_formats() of jeat_graph.io.formats.registry",
             path,
         )
     with TrajectoryWriter(path, classes=table.classes is not None) as writer:
@@ -168,15 +169,18 @@ def read_trajectories(
     Raises:
         DataError: names the file, the line or row, and what is wrong, such as a track twice at one time.
     """
-    return read_trajectories_counted(path, fmt, Reading(**options))[0]
+    how = Reading(**options)
+    table, count = read_trajectories_counted(path, fmt, how)
+    note_first(str(path), count, how.first_frame)
+    return table
 
 
 def read_trajectories_counted(
     path: str | Path, fmt: str | None, how: Reading
-) -> tuple[Trajectories, int | None]:
-    """Read as `read_trajectories` does, and tell the first frame's number where the format leaves it open."""
+) -> tuple[Trajectories, FrameCount | None]:
+    """Read as `read_trajectories` does, and tell the frame numbers of a file that counts frames."""
     kind = recognise(path, fmt)
-    if kind in _TABLES:
+    if kind.is_table:
         if Path(path).stat().st_size < _BLANK_BYTES and not Path(path).read_bytes().strip():
             return Trajectories.empty(), None
         if not is_result(known_columns(path, RESULT_COLUMNS)):
@@ -184,10 +188,10 @@ def read_trajectories_counted(
             fields = run_fields(table)
             check_tracks(table.error, fields)
             return Trajectories(**fields), None
-    rows = read_rows(path, kind, how) if kind not in _TABLES else read_result_table(path, how)
+    rows = read_result_table(path, how) if kind.is_table else kind.read_boxes(path, how)
     fields = _without_motion(rows, path)
     check_tracks(rows.error, fields)
-    return Trajectories(**fields), rows.first
+    return Trajectories(**fields), rows.frames
 
 
 def _without_motion(rows: FileBoxes, path: str | Path) -> dict[str, Any]:

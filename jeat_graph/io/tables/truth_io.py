@@ -11,6 +11,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.class_columns import LISTS_COUNT_FROM
 from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import FrameCount, note_first
 from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.tables.truth_table import (
     MOTION,
@@ -21,35 +22,24 @@ from jeat_graph.data.tables.truth_table import (
     truth_of_table,
 )
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.io.tables.box_rows import read_rows
+from jeat_graph.io.formats.registry import recognise
 from jeat_graph.io.tables.class_names import names_by_number
 from jeat_graph.io.tables.file_tables import read_table
-from jeat_graph.io.tables.formats import recognise
 from jeat_graph.io.tables.table_writer import write_columns
 
 
 def read_truth(path: str | Path, *, fmt: str | None = None, **options: Unpack[ReadingOptions]) -> GroundTruth:
     """Read ground truth from a file of any known format.
 
-    ============  ==========================================================================================
-    csv, parquet  `t, object_id, left, top, width, height`, optional `x, y, vx, vy, ax, ay, class, ignore,
-                  distance`; a row with only `t` is a recorded frame without objects. With any motion column
-                  there is motion: a column that is absent is NaN, except x and y, then the box's centre.
-                  Usual other names are understood, see `column_names`.
-    motchallenge  column 7 = 0 means ignore. With 9 columns the 8th is the class, by the challenge's names
-                  beside a `seqinfo.ini`, else by number unless `labels.txt` lies beside it; with 10, columns
-                  8 to 10 are world coordinates and are passed over. Rate from `rate_hz` or `seqinfo.ini`.
-                  Also in a zip that CVAT takes or gives (`MOT 1.1`).
-    kitti         tracking labels (17 columns); type is the class, `DontCare` is ignored, `distance` is that
-                  of the 3D location. 10 Hz unless `rate_hz` says else.
-    prophesee     structured `.npy` with `t` or `ts` (µs), `x, y, w, h, track_id`, optional `class_id`.
-    coco          data set whose annotations have `track_id`; `iscrowd` or `ignore` means ignore.
-    yolo          folder of labels with a track in the last column; needs `image` and `rate_hz`.
-    ============  ==========================================================================================
+    The formats are those of `jeat_graph.io.formats` (`docs/reference/formats.md`), where their boxes have
+    identities. A table (CSV, Parquet) has the columns `t, object_id, left, top, width, height`, optional `x,
+    y, vx, vy, ax, ay, class, ignore, distance`; a row with only `t` is a recorded frame without objects. With
+    any motion column there is motion: a column that is absent is NaN, except x and y, then the box's centre.
+    Usual other names are understood, see `column_names`.
 
     MOTChallenge, KITTI and YOLO cannot say that a frame is empty: all frames between the first and the last
     are taken as recorded (every n-th, see `fill_frames`; to the length in `seqinfo.ini`, if there is one).
-    For `prophesee` and `coco` without a list of images that is done only where `rate_hz` is given.
+    Of files with times of their own that is done only where `rate_hz` is given.
 
     Args:
         path: the file.
@@ -59,15 +49,20 @@ def read_truth(path: str | Path, *, fmt: str | None = None, **options: Unpack[Re
     Raises:
         DataError: names the file, the line or row, and what is wrong, such as an object twice at one time.
     """
-    return read_truth_counted(path, fmt, Reading(**options))[0]
+    how = Reading(**options)
+    truth, count = read_truth_counted(path, fmt, how)
+    note_first(str(path), count, how.first_frame)
+    return truth
 
 
-def read_truth_counted(path: str | Path, fmt: str | None, how: Reading) -> tuple[GroundTruth, int | None]:
-    """Read truth as `read_truth` does, and tell the first frame's number where its format leaves it open."""
+def read_truth_counted(
+    path: str | Path, fmt: str | None, how: Reading
+) -> tuple[GroundTruth, FrameCount | None]:
+    """Read truth as `read_truth` does, and tell the frame numbers of a file that counts frames."""
     kind = recognise(path, fmt)
-    if kind in ("csv", "parquet"):
+    if kind.is_table:
         return _read_contract(path, how)
-    rows = read_rows(path, kind, how, truth=True)
+    rows = kind.read_boxes(path, how, truth=True)
     frames = np.unique(rows.recorded())
     if rows.ids is None and len(rows.t):
         raise DataError("has no identities (a column or field such as track_id); truth needs ids", path)
@@ -89,9 +84,11 @@ def read_truth_counted(path: str | Path, fmt: str | None, how: Reading) -> tuple
         ignore=np.asarray(ignore, dtype=bool),
         classes=rows.classes,
         distance=rows.distance,
+        truncation=rows.truncation,
+        occlusion=rows.occlusion,
         frames=frames,
     )
-    return truth, rows.first
+    return truth, rows.frames
 
 
 def write_truth(truth: GroundTruth, path: str | Path) -> None:
@@ -123,6 +120,6 @@ def write_truth(truth: GroundTruth, path: str | Path) -> None:
     write_columns(columns, path)
 
 
-def _read_contract(path: str | Path, how: Reading) -> tuple[GroundTruth, int | None]:
+def _read_contract(path: str | Path, how: Reading) -> tuple[GroundTruth, FrameCount | None]:
     table = read_table(path, REQUIRED, OPTIONAL, short=("t",), aliases=True)
     return truth_of_table(table, how, names_by_number(how.class_names, path, LISTS_COUNT_FROM))

@@ -36,7 +36,7 @@ from jeat_graph.detection.models.class_names import wanted_classes
 from jeat_graph.io.events.converting import convert
 from jeat_graph.io.events.indexed import IndexedFile, open_indexed
 from jeat_graph.io.events.opening import open_events
-from jeat_graph.io.tables.prophesee import boxes_of, read_array, times_of
+from jeat_graph.io.formats.prophesee import boxes_of, read_array, times_of
 from jeat_graph_sehn.training.data_sets import EventSegment
 from jeat_graph_sehn.training.label_times import LabelTimes
 from jeat_graph_sehn.training.settings import LabelSettings

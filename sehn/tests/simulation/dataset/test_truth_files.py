@@ -11,7 +11,7 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.tables.reading import Reading
-from jeat_graph.io.tables.coco import read_results
+from jeat_graph.io.formats.coco import read_results
 from jeat_graph.io.tables.truth_io import read_truth
 from jeat_graph_sehn.simulation.dataset.truth_files import SegmentTruth
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.eval.overlapping import OverlappingPairs, assign
+from jeat_graph.eval.scores.record import Metric
 
 #: IoU thresholds α over which the scores are averaged (the paper's 0.05, 0.10 … 0.95).
 ALPHAS = np.arange(0.05, 0.99, 0.05)
@@ -59,11 +60,12 @@ class HotaCounts:
         return np.asarray(np.sqrt(self.deta * self.assa))
 
 
-def hota_counts(pairs: OverlappingPairs) -> HotaCounts:
+def hota_counts(pairs: OverlappingPairs, _: float = 0.0) -> HotaCounts:
     """Count matches and errors of one sequence at every threshold.
 
     The boxes of a frame are matched once, for the largest sum of IoU times alignment of the two identities
-    over the whole sequence; a threshold then leaves out the matches that overlap by less.
+    over the whole sequence; a threshold then leaves out the matches that overlap by less. The thresholds are
+    HOTA's own, so that the one of the other metrics does not matter.
     """
     kind, which = np.unique(pairs.key, return_inverse=True)
     truth, track = np.divmod(kind, max(len(pairs.track_boxes_of), 1))
@@ -124,3 +126,22 @@ def _match(pairs: OverlappingPairs, alignment: FloatArray) -> BoolArray:
         shape = (int(pairs.truth_count[frame]), int(pairs.track_count[frame]))
         chosen[here] = assign(score[here], pairs.row[here], pairs.column[here], shape)
     return chosen
+
+
+def _scores(counts: HotaCounts) -> dict[str, float | int]:
+    means = {"HOTA": counts.hota, "DetA": counts.deta, "AssA": counts.assa, "LocA": counts.loca}
+    return {name: 100.0 * float(values.mean()) for name, values in means.items()}
+
+
+METRIC = Metric(
+    name="hota",
+    shares={
+        "HOTA": "geometric mean of DetA and AssA, averaged over the IoU thresholds 0.05, 0.10 … 0.95",
+        "DetA": "detection accuracy, averaged likewise",
+        "AssA": "association accuracy, averaged likewise",
+        "LocA": "localisation accuracy, averaged likewise",
+    },
+    count=hota_counts,
+    pool=pooled_hota,
+    scores=_scores,
+)

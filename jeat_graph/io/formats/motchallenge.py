@@ -6,26 +6,38 @@ text files.
 
 What stands in columns 8 and up differs by year and is told by their number: with 9 columns the file is of
 2016 or later and column 8 is the class and 9 the visibility; with 10 columns, 8 to 10 are world coordinates,
-often -1, and there is no class, unless 8 holds whole numbers and 9 and 10 only marks. Column 7 is a
-detection's confidence; in truth, 0 there marks an object that is not to be judged.
+often -1, and there is no class, unless 8 holds whole numbers and 9 and 10 only marks. With 11 columns there
+is a class beside the world coordinates: in column 8, or in the last one if 8 has no whole numbers from 0 up.
+Column 7 is a detection's confidence; in truth, 0 there marks an object that is not to be judged.
 """
 
 from __future__ import annotations
 
 import configparser
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.challenge_classes import CHALLENGE
 from jeat_graph.data.class_columns import name_classes
+from jeat_graph.data.column_names import BOX
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_numbers import FrameCount, first_frame
 from jeat_graph.data.tables.file_table import FileTable
-from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.data.tables.frame_filling import check_rate, fill_frames
+from jeat_graph.data.tables.reading import Reading
+from jeat_graph.data.tables.spreadsheets import is_number
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.files.zipped import LABELS, MEMBER, read_member
+from jeat_graph.io.formats.record import BoxFormat, Certainty, FileBoxes, FileHead, SequenceInfo, always
+from jeat_graph.io.tables.by_frame import by_frame
 from jeat_graph.io.tables.class_names import ClassNames, lines_of_names, names_by_number
-from jeat_graph.io.tables.plain_text import read_plain
+from jeat_graph.io.tables.plain_text import frames_of, read_plain
+from jeat_graph.io.tables.rounding import round_decimals
+from jeat_graph.io.tables.table_writer import write_columns
+from jeat_graph.io.tables.trajectories_io import EXISTENCE_DECIMALS, PX_DECIMALS
 
 FIRST_FRAME = 1
 _FIRST_CLASS = 1
@@ -36,26 +48,11 @@ _COLUMNS = {
     8: (*_BASE, "conf", "class"),
     9: (*_BASE, "conf", "class", "visibility"),
     10: (*_BASE, "conf", "x", "y", "z"),
+    11: (*_BASE, "conf", "eighth", "ninth", "tenth", "last"),
 }
 # Columns of 10 that may hold a class and two marks (cut off, hidden) instead of a place in the world.
 _WORLD = ("x", "y", "z")
 _MARKS = (np.array([-1, 0, 1]), np.array([-1, 0, 1, 2]))
-#: The labels of the 2016 and later challenges, from 1.
-CHALLENGE = (
-    "pedestrian",
-    "person_on_vehicle",
-    "car",
-    "bicycle",
-    "motorbike",
-    "non_motorized_vehicle",
-    "static_person",
-    "distractor",
-    "occluder",
-    "occluder_on_the_ground",
-    "occluder_full",
-    "reflection",
-    "crowd",
-)
 
 
 def read_lines(path: str | Path) -> FileTable:
@@ -96,7 +93,7 @@ def class_names(
     Raises:
         DataError: a class that is no whole number, or a list of names that cannot be read.
     """
-    column = "class" if "class" in table else "x" if _class_before_marks(table) else None
+    column = _class_column(table)
     if column is None:
         return np.zeros(0, dtype=np.str_) if not len(table) else None
     distinct, index = np.unique(table.whole(column), return_inverse=True)
@@ -109,13 +106,28 @@ def class_names(
     return name_classes(texts[index.reshape(-1)], names)
 
 
+def _class_column(table: FileTable) -> str | None:
+    """The column that holds classes, if there is one."""
+    if "class" in table:
+        return "class"
+    if "last" in table and len(table):
+        return next((name for name in ("eighth", "last") if _holds_classes(table.number(name))), None)
+    return "x" if _class_before_marks(table) else None
+
+
+def _holds_classes(numbers: FloatArray) -> bool:
+    """Whether numbers (R,) are classes: whole, -1 where unknown, and known somewhere."""
+    return bool(np.all((numbers == np.rint(numbers)) & (numbers >= -1)) and (numbers >= 0).any())
+
+
 def _class_before_marks(table: FileTable) -> bool:
     """Whether columns 8 to 10 are a class and two marks, as VisDrone and some trackers write them."""
     if "x" not in table or not len(table):
         return False
     kind, *marks = (table.number(name) for name in _WORLD)
-    whole = bool(np.all((kind == np.rint(kind)) & (kind >= -1)) and (kind >= 0).any())
-    return whole and all(np.isin(mark, known).all() for mark, known in zip(marks, _MARKS, strict=True))
+    return _holds_classes(kind) and all(
+        np.isin(mark, known).all() for mark, known in zip(marks, _MARKS, strict=True)
+    )
 
 
 def _names_in_zip(path: Path) -> dict[int, str] | None:
@@ -123,22 +135,6 @@ def _names_in_zip(path: Path) -> dict[int, str] | None:
     if data is None:
         return None
     return dict(enumerate(lines_of_names(data.decode("utf-8", errors="replace")), _FIRST_CLASS))
-
-
-class SequenceInfo(NamedTuple):
-    """What `seqinfo.ini` says of a sequence; None where it says nothing.
-
-    Attributes:
-        rate_hz: frames per second.
-        length: number of frames.
-        size_px: width and height of the picture.
-        origin: the file.
-    """
-
-    rate_hz: float | None = None
-    length: int | None = None
-    size_px: tuple[int, int] | None = None
-    origin: Path | None = None
 
 
 def sequence_info(path: str | Path) -> SequenceInfo:
@@ -186,3 +182,77 @@ def sequence_rate(
             path,
         )
     return check_rate(rate, path), info.length
+
+
+def read_boxes(path: str | Path, how: Reading, truth: bool = False) -> FileBoxes:
+    """Read detections, truth or results.
+
+    Args:
+        path: the file.
+        how: what it does not say itself.
+        truth: whether it is truth: that of the challenge has names for its classes.
+
+    Raises:
+        DataError: names the line and what is wrong.
+    """
+    table = read_lines(path)
+    numbers = table.whole("frame")
+    first = first_frame(numbers, how.first_frame)
+    frame = frames_of(table, first) - first
+    rate, length = sequence_rate(path, how.rate_hz, None if len(frame) else 1.0)
+    challenge = truth and sequence_info(path).origin is not None
+    conf = table.number("conf") if "conf" in table else None
+    return FileBoxes(
+        t=frame / rate,
+        boxes=boxes_of(table),
+        error=table.error,
+        recorded=lambda: (fill_frames(frame + 1, path, length) - 1) / rate,
+        scores=conf,
+        ids=table.whole("id"),
+        classes=class_names(table, how.class_names, challenge),
+        ignore=None if conf is None else conf == 0,
+        frames=FrameCount.of(numbers, first, usual=FIRST_FRAME)._replace(length=length),
+    )
+
+
+def write_motchallenge(table: Trajectories, path: str | Path, rate_hz: float) -> None:
+    """Write boxes as a result: `frame, id, left, top, width, height, existence, -1, -1, -1`.
+
+    The format has no classes; those of CVAT have (`exporting/cvat.py`).
+
+    Times go to the nearest frame, counted from 1; sampling the table at frame times is the caller's business.
+    Of several rows of one track in one frame the last is written.
+
+    Raises:
+        DataError: the rate is not positive, or a time lies before frame 1.
+    """
+    frame, kept = by_frame(table, path, rate_hz)
+    boxes = round_decimals(kept.boxes, PX_DECIMALS)
+    columns: dict[str, Any] = {"frame": frame + FIRST_FRAME, "id": kept.track_id}
+    columns |= {name: boxes[:, k] for k, name in enumerate(BOX)}
+    columns["conf"] = round_decimals(kept.existence, EXISTENCE_DECIMALS)
+    columns |= {name: np.full(len(kept), -1) for name in ("world_x", "world_y", "world_z")}
+    write_columns(columns, path, header=False)
+
+
+def _recognise(head: FileHead) -> Certainty:
+    """A zip of CVAT's; else a first line of numbers alone, or no line."""
+    if read_member(head.path, MEMBER) is not None:
+        return Certainty.SAYS
+    numbers = len(head.fields) >= min(_COLUMNS) and all(map(is_number, head.fields))
+    return Certainty.LOOKS if numbers or head.blank else Certainty.NONE
+
+
+FORMAT = BoxFormat(
+    name="motchallenge",
+    title="MOTChallenge",
+    reads="`det.txt`, `gt.txt` and results of 6 to 11 columns, also those of VisDrone, and in a zip of "
+    "CVAT's `MOT 1.1`; the frame rate from `--rate` or `seqinfo.ini`, the picture's size from "
+    "`seqinfo.ini`; in truth, 0 in column 7 means ignore",
+    recognise=_recognise,
+    read=read_boxes,
+    counts_frames=always,
+    facts=sequence_info,
+    suffix=".mot.txt",
+    write=write_motchallenge,
+)

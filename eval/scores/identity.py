@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from jeat_graph.eval.overlapping import OverlappingPairs
+from jeat_graph.eval.scores.record import Metric
 
 
 @dataclass(frozen=True)
@@ -86,3 +87,20 @@ def pooled_identity(sequences: Sequence[IdentityCounts]) -> IdentityCounts:
         IDFP=sum(one.IDFP for one in sequences),
         IDFN=sum(one.IDFN for one in sequences),
     )
+
+
+def _scores(counts: IdentityCounts) -> dict[str, float | int]:
+    return {"IDF1": 100.0 * counts.idf1, "IDP": 100.0 * counts.idp, "IDR": 100.0 * counts.idr}
+
+
+METRIC = Metric(
+    name="identity",
+    shares={
+        "IDF1": "F1 score of the best one-to-one map of identities",
+        "IDP": "precision of that map",
+        "IDR": "recall of that map",
+    },
+    count=identity_counts,
+    pool=pooled_identity,
+    scores=_scores,
+)

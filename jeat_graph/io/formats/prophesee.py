@@ -14,12 +14,18 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM, name_classes
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.tables.file_table import FileTable
+from jeat_graph.data.tables.frame_filling import gap_times
+from jeat_graph.data.tables.reading import Reading
+from jeat_graph.io.formats.record import BoxFormat, Certainty, FileBoxes, FileHead, no_frames
+from jeat_graph.io.tables.class_names import names_by_number
 from jeat_graph.io.tables.csv_text import read_bytes
 
 _ALIASES = {"ts": "t", "confidence": "class_confidence"}
 _US_PER_S = 1e6
+_MAGIC, _SUFFIX = b"\x93NUMPY", ".npy"
 
 
 def read_array(path: str | Path) -> FileTable:
@@ -72,3 +78,45 @@ def boxes_of(table: FileTable) -> FloatArray:
 def class_names(table: FileTable) -> np.typing.NDArray[np.str_] | None:
     """Return the class numbers (R,) as text, or None if there are none."""
     return table.whole("class_id").astype(np.str_) if "class_id" in table else None
+
+
+def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxes:
+    """Read an array of boxes.
+
+    Raises:
+        DataError: names the row and what is wrong.
+    """
+    table = read_array(path)
+    t = times_of(table)
+    names = names_by_number(how.class_names, path, LISTS_COUNT_FROM)
+
+    def recorded() -> FloatArray:
+        gaps = np.zeros(0) if how.rate_hz is None else gap_times(t, how.rate_hz, path)
+        return np.union1d(t, gaps)
+
+    return FileBoxes(
+        t=t,
+        boxes=boxes_of(table),
+        error=table.error,
+        recorded=recorded,
+        scores=table.number("class_confidence") if "class_confidence" in table else None,
+        ids=table.whole("track_id") if "track_id" in table else None,
+        classes=name_classes(class_names(table), names),
+    )
+
+
+def _recognise(head: FileHead) -> Certainty:
+    if head.data.startswith(_MAGIC):
+        return Certainty.SAYS
+    return Certainty.NAMED if head.suffix == _SUFFIX else Certainty.NONE
+
+
+FORMAT = BoxFormat(
+    name="prophesee",
+    title="Prophesee, DSEC",
+    reads="box arrays (`.npy`), fields found by name: `t` or `ts` (µs), `x, y, w, h`, `class_confidence` or "
+    "`confidence`, `track_id`, `class_id`",
+    recognise=_recognise,
+    read=read_boxes,
+    counts_frames=no_frames,
+)

@@ -17,16 +17,18 @@ import numpy as np
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
 from jeat_graph.data.class_columns import name_classes
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_numbers import first_frame
-from jeat_graph.data.tables.frame_filling import check_rate
+from jeat_graph.data.frame_numbers import FrameCount, first_frame
+from jeat_graph.data.tables.frame_filling import check_rate, gap_times
 from jeat_graph.data.tables.reading import Reading
+from jeat_graph.io.formats.record import BoxFormat, Certainty, FileBoxes, FileHead
 from jeat_graph.io.tables.class_names import names_by_number
 from jeat_graph.io.tables.coco_columns import Entries, read_entries
 from jeat_graph.io.tables.coco_entries import WANTED, one_by_one
 from jeat_graph.io.tables.coco_images import Images, read_images
-from jeat_graph.io.tables.csv_text import read_text
+from jeat_graph.io.tables.csv_text import read_bytes, read_text
 
 _FIRST_CATEGORY = 0
+_SUFFIX = ".json"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +43,7 @@ class CocoBoxes:
         recorded: (T,) times of all images (s) if they are listed, else None.
         ids: (R,) identity of each box, or None.
         ignore: (R,) true for boxes that are not asked for, or None.
-        first: number of the first image, or None where images have times of their own.
+        frames: numbers of the images, or None where these have times of their own.
         entry: (R,) number of each box's entry in the file, from 0.
     """
 
@@ -52,7 +54,7 @@ class CocoBoxes:
     recorded: FloatArray | None
     ids: IntArray | None
     ignore: BoolArray | None
-    first: int | None
+    frames: FrameCount | None
     entry: IntArray
 
 
@@ -96,7 +98,7 @@ def _placed(
     recorded: FloatArray | None = None
     if images is None:
         counted = first_frame(found.image, how.first_frame)
-        first: int | None = counted
+        frames: FrameCount | None = FrameCount.of(found.image, counted)
         if len(found.image) and how.rate_hz is None:
             raise DataError(
                 "COCO results have image ids only; give the frame rate (--rate, in Python rate_hz) "
@@ -109,7 +111,7 @@ def _placed(
         rate = 1.0 if how.rate_hz is None else check_rate(how.rate_hz, path)
         t = (found.image - counted) / rate
     else:
-        first, recorded = images.first, np.unique(np.array(list(images.time.values()), dtype=np.float64))
+        frames, recorded = images.frames, np.unique(np.array(list(images.time.values()), dtype=np.float64))
         image, of_entry = np.unique(found.image, return_inverse=True)
         known = np.array([number in images.known for number in image.tolist()], dtype=bool)[of_entry]
         if not known.all():
@@ -133,7 +135,7 @@ def _placed(
         recorded=recorded,
         ids=None if found.track is None else found.track[kept],
         ignore=None if found.ignore is None else found.ignore[kept],
-        first=first,
+        frames=frames,
         entry=kept,
     )
 
@@ -157,3 +159,54 @@ def _category_names(categories: Any) -> dict[int, str]:
         for item in categories
         if isinstance(item, dict) and isinstance(item.get("id"), int) and "name" in item
     }
+
+
+def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxes:
+    """Read results, or a data set.
+
+    Raises:
+        DataError: names the entry and what is wrong.
+    """
+    found = read_results(path, how)
+
+    def error(row: int, message: str) -> DataError:
+        return DataError(f"entry {found.entry[row] + 1}: {message}", path)
+
+    def recorded() -> FloatArray:
+        if found.recorded is not None:
+            return found.recorded
+        gaps = np.zeros(0) if how.rate_hz is None else gap_times(found.t, how.rate_hz, path)
+        return np.union1d(found.t, gaps)
+
+    return FileBoxes(
+        t=found.t,
+        boxes=found.boxes,
+        error=error,
+        recorded=recorded,
+        scores=found.scores,
+        ids=found.ids,
+        classes=found.classes,
+        ignore=found.ignore,
+        frames=found.frames,
+    )
+
+
+def _recognise(head: FileHead) -> Certainty:
+    if head.suffix == _SUFFIX:
+        return Certainty.NAMED
+    return Certainty.LOOKS if head.text[:1] in ("[", "{") else Certainty.NONE
+
+
+def _counts_frames(path: str | Path) -> bool:
+    return b'"timestamp"' not in read_bytes(path)
+
+
+FORMAT = BoxFormat(
+    name="coco",
+    title="COCO",
+    reads="results or a data set, JSON; times from `--images` or the data set's own list, else the image "
+    "number by `--rate`; `iscrowd` or `ignore` in truth means ignore",
+    recognise=_recognise,
+    read=read_boxes,
+    counts_frames=_counts_frames,
+)

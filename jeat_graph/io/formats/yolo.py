@@ -8,23 +8,31 @@ found has an empty file, or none.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM, name_classes
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_numbers import split_picture_name
+from jeat_graph.data.frame_numbers import FrameCount, first_frame, split_picture_name
+from jeat_graph.data.tables.frame_filling import check_rate, fill_frames
 from jeat_graph.data.tables.reading import Reading
 from jeat_graph.data.tables.spreadsheets import is_number
 from jeat_graph.data.videos import choose_video
-from jeat_graph.io.tables.class_names import LISTS
+from jeat_graph.io.formats.record import BoxFormat, Certainty, FileBoxes, FileHead, always
+from jeat_graph.io.tables.class_names import LISTS, names_by_number
 from jeat_graph.io.tables.csv_text import read_text
 
 _FEWEST, _MOST = 5, 7
 _OTHER_FILES = frozenset((*LISTS, "train.txt", "val.txt", "test.txt", "readme.txt"))
 _SUFFIX = ".txt"
+_ONE_PICTURE = (
+    "looks like labels of YOLO (class, centre and size in shares of the picture, one file for each): "
+    "give the folder with the files of all pictures, with --image WIDTHxHEIGHT and --rate"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +76,8 @@ def read_labels(path: str | Path, how: Reading) -> Labels:
             has labels of several videos and none is chosen.
     """
     folder = Path(path)
+    if not folder.is_dir():
+        raise DataError(_ONE_PICTURE, folder, 1)
     by_video: dict[str, list[tuple[int, Path]]] = {}
     for video, number, file in _files(folder):
         by_video.setdefault(video, []).append((number, file))
@@ -156,3 +166,61 @@ def _score_and_track(found: FloatArray) -> tuple[FloatArray | None, IntArray | N
     if len(last) and bool((last == np.rint(last)).all()) and last.max() > 1.0:
         return None, last.astype(np.int64)
     return last, None
+
+
+def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxes:
+    """Read the labels of a folder.
+
+    Raises:
+        DataError: as `read_labels`; or no rate is given.
+    """
+    labels = read_labels(path, how)
+    first = first_frame(labels.looked, how.first_frame)
+    if how.rate_hz is None:
+        raise DataError("has frame numbers only; give their rate with --rate (in Python rate_hz)", path)
+    rate = check_rate(how.rate_hz, path)
+    if len(labels.looked) and labels.looked[0] < first:
+        raise DataError(f"frames count from {first}, got {labels.looked[0]}", path)
+    return FileBoxes(
+        t=(labels.frame - first) / rate,
+        boxes=labels.boxes,
+        error=labels.error,
+        recorded=lambda: (fill_frames(labels.looked, path) - first) / rate,
+        scores=labels.scores,
+        ids=labels.ids,
+        classes=name_classes(
+            labels.kind.astype(np.str_), names_by_number(how.class_names, path, LISTS_COUNT_FROM)
+        ),
+        frames=FrameCount.of(labels.looked, first),
+    )
+
+
+def _is_label(fields: Sequence[str]) -> bool:
+    """Whether the fields of a line are a class, four shares of a picture and perhaps a score and a track."""
+    if not _FEWEST <= len(fields) <= _MOST or not all(map(is_number, fields)):
+        return False
+    x, y, width, height = map(float, fields[1:5])
+    return (
+        fields[0].isdigit()
+        and min(width, height) > 0.0
+        and max(x, y, width, height) <= 1.0
+        and min(x, y) >= 0.0
+    )
+
+
+def _recognise(head: FileHead) -> Certainty:
+    """The labels of one picture, which reading refuses: a folder is recognised as one."""
+    return Certainty.LOOKS_EXACTLY if _is_label(head.fields) else Certainty.NONE
+
+
+FORMAT = BoxFormat(
+    name="yolo",
+    title="YOLO",
+    reads="a folder of labels, one `NAME_FRAME.txt` a picture, perhaps with a score and a track in the last "
+    "columns; needs `--image WxH` and `--rate`",
+    recognise=_recognise,
+    read=read_boxes,
+    counts_frames=always,
+    in_shares=True,
+    is_folder=is_label_folder,
+)

@@ -14,6 +14,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray
 from jeat_graph.eval.overlapping import OverlappingPairs, assign
+from jeat_graph.eval.scores.record import Metric
 
 #: A match that goes on outweighs any overlap, so that it is given up only when it is no longer valid.
 CONTINUED = 1000.0
@@ -124,3 +125,28 @@ def _match(valid: OverlappingPairs) -> BoolArray:
         shape = (int(valid.truth_count[frame]), int(valid.track_count[frame]))
         chosen[here] = assign(score, valid.row[here], valid.column[here], shape)
     return chosen
+
+
+def _scores(counts: ClearCounts) -> dict[str, float | int]:
+    shares = {"MOTA": 100.0 * counts.mota, "MOTP": 100.0 * counts.motp}
+    return shares | {name: getattr(counts, name) for name in METRIC.numbers}
+
+
+METRIC = Metric(
+    name="clear",
+    shares={"MOTA": "1 - (FP + FN + IDSW) / truth boxes", "MOTP": "mean IoU of the matches"},
+    numbers={
+        "TP": "matched boxes",
+        "FP": "track boxes without a truth box",
+        "FN": "truth boxes without a track",
+        "IDSW": "identity switches",
+        "MT": "objects tracked in more than 80 % of their frames",
+        "PT": "objects tracked in 20 to 80 %",
+        "ML": "objects tracked in less than 20 %",
+        "Frag": "interruptions of a tracked object",
+    },
+    hidden=("TP",),
+    count=clear_counts,
+    pool=pooled_clear,
+    scores=_scores,
+)

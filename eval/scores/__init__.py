@@ -1,0 +1,1 @@
+"""Metrics of tracking, one module with one record each; `eval.metrics` finds them."""

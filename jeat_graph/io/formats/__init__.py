@@ -1,0 +1,1 @@
+"""File formats of boxes, one module with one record each; `registry` finds them."""
