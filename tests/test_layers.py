@@ -34,7 +34,7 @@ LAYERS = (
     ("tracking",),
     ("eval",),
     ("runs",),
-    ("calibration", "drawing", "road", "detection", "live"),
+    ("calibration", "drawing", "road", "corridor", "detection", "live"),
     ("api",),
     ("",),
     ("cli",),

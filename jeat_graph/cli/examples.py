@@ -39,6 +39,7 @@ EXAMPLES = {
     "register": "jeat-graph register rgb.csv evt.csv --out rig.yaml",
     "camera": "jeat-graph camera calibrate --run run --lengths lengths.csv --out camera.yaml",
     "road": "jeat-graph road run --camera camera.yaml --out speeds",
+    "handover": "jeat-graph handover A=speeds-a B=speeds-b --distance A-B=500±5 --out through",
 }
 
 

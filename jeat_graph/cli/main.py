@@ -42,6 +42,7 @@ COMMANDS = (
     "count",
     "camera",
     "road",
+    "handover",
     "events",
     "detect",
     "detectors",

@@ -6,10 +6,11 @@ import argparse
 import sys
 from argparse import ArgumentTypeError
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.config.argument_types import counting, drawn_size
+from jeat_graph.config.argument_types import counting, drawn_size, positive, share
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.progress import refreshing
 
@@ -32,6 +33,8 @@ _PICTURE_ONLY = (
     *("world", "event_camera", "masks"),
 )
 _CARLA_ONLY = ("carla_host", "carla_port")
+_CORRIDOR_ONLY = ("cameras", "flow", "ramps", "queue")
+_CORRIDOR_DURATION_S = 900.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -123,6 +126,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="YAML with settings of renderer and cameras (sections render, rgb, evt)",
     )
+    corridor = parser.add_argument_group("with SCENARIO corridor", "what `road` would write of each camera")
+    corridor.add_argument(
+        "--cameras", type=_places, metavar="M,M,…", help="places of the cameras along the road (m; 0,500)"
+    )
+    corridor.add_argument("--flow", type=positive, metavar="N", help="vehicles an hour (2400)")
+    corridor.add_argument(
+        "--ramps", type=share, metavar="SHARE", help="that leaves and joins in each gap (0.04)"
+    )
+    corridor.add_argument(
+        "--queue", type=_span, metavar="S,S", help="from when until when the first gap is slow (s; never)"
+    )
     carla = parser.add_argument_group("with --sensors carla (experimental)")
     carla.add_argument("--carla-host", metavar="HOST", help="host of the server (default localhost)")
     carla.add_argument(
@@ -138,6 +152,11 @@ def run(args: argparse.Namespace) -> int:
         return _verify(Path(args.verify))
     if args.scenario is None or args.out is None:
         raise ConfigError("SCENARIO and --out DIR are needed (or --verify DIR)")
+    told = [name for name in _CORRIDOR_ONLY if getattr(args, name) is not None]
+    if args.scenario == "corridor":
+        return _corridor(args)
+    if told:
+        raise ConfigError(f"--{told[0]} goes with the scenario corridor")
     unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration",))]
     unfit += [] if args.sensors in ("detections", "pictures") else ["rig"]
     unfit += [] if args.sensors == "carla" else _CARLA_ONLY
@@ -315,6 +334,56 @@ def _rig(given: str | None) -> RigConfig | str | None:
         return given
     found: RigConfig = build(RigConfig, _read_yaml(Path(given)), "")
     return found
+
+
+def _corridor(args: argparse.Namespace) -> int:
+    """Simulate a road with several cameras and write what `road` would write of each."""
+    from jeat_graph.io.files.outputs import check_folder
+    from jeat_graph_sehn.simulation.corridor.traffic import TrafficConfig
+    from jeat_graph_sehn.simulation.corridor.writing import write_corridor_world
+
+    other = [
+        name for name in (*_PICTURE_ONLY, *_CARLA_ONLY, "rig", "density") if getattr(args, name) is not None
+    ]
+    if other or args.sensors != "detections":
+        name = other[0] if other else "sensors"
+        raise ConfigError(f"--{name.replace('_', '-')} does not go with the scenario corridor")
+    check_folder(args.out)
+    ramps = 0.04 if args.ramps is None else args.ramps
+    start, end = (0.0, 0.0) if args.queue is None else args.queue
+    config = TrafficConfig(
+        duration_s=_CORRIDOR_DURATION_S if args.duration is None else args.duration,
+        flow_per_h=2400.0 if args.flow is None else args.flow,
+        places_m=(0.0, 500.0) if args.cameras is None else args.cameras,
+        leave=ramps,
+        join=ramps,
+        queue_from_s=start,
+        queue_until_s=end,
+    )
+    folders = write_corridor_world(config, args.seed, Path(args.out))
+    print(f"{len(folders)} cameras: {args.out}")
+    return 0
+
+
+def _places(text: str) -> tuple[float, ...]:
+    try:
+        places = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise ArgumentTypeError(f"must be places in m such as 0,500,1200, not {text!r}") from None
+    apart = [b - a for a, b in pairwise(places)]
+    if len(places) < 2 or not all(20.0 <= gap <= 20_000.0 for gap in apart):
+        raise ArgumentTypeError("must be two places or more, each 20 m to 20 km beyond the one before")
+    return places
+
+
+def _span(text: str) -> tuple[float, float]:
+    try:
+        start, end = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ArgumentTypeError(f"must be two times in s such as 200,400, not {text!r}") from None
+    if not 0.0 <= start < end:
+        raise ArgumentTypeError("must be two times, the second one later")
+    return start, end
 
 
 def _verify(folder: Path) -> int:

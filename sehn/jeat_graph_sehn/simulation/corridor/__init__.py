@@ -1,0 +1,1 @@
+"""A road with several cameras along it: traffic, ramps, queues, and the cameras' tables with their clocks."""
