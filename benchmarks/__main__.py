@@ -44,6 +44,10 @@ KINDS = {
     "raw": ("benchmarks.raw", "from raw pictures and raw events to tracks"),
     "road": ("benchmarks.road", "place and speed on simulated roads"),
     "road-real": ("benchmarks.road_real", "speeds on real highways against laser gates"),
+    "handover": (
+        "benchmarks.handover",
+        "vehicles followed from camera to camera, on simulated roads and real highways",
+    ),
     "speed": ("benchmarks.speed", "time per step, against others"),
     "endurance": (
         "benchmarks.endurance",

@@ -145,7 +145,7 @@ def judge_camera(folder: Path, which: str, every: int) -> dict[str, Any]:
         for v in follow_points(sample, camera, MotionFitConfig(), ContactConfig())[0]
         if v.t[-1] - v.t[0] > _LEAST_S
     ]
-    gates = _read_gates(folder / "speeds.csv")
+    gates = read_gates(folder / "speeds.csv")
     seen = np.array([[v.t[0], v.t[-1]] for v in vehicles]).reshape(-1, 2)
     pairs = paired(seen, gates.times)
     speeds = [vehicles[k].mean_speed(*vehicles[k].fit.window()) for k, _ in pairs]
@@ -191,7 +191,8 @@ def paired(seen: FloatArray, true: FloatArray) -> list[tuple[int, int]]:
     return [(int(k), int(v)) for k, v in zip(*np.nonzero(single), strict=True)]
 
 
-def _read_gates(path: Path) -> Gates:
+def read_gates(path: Path) -> Gates:
+    """Read the true speeds of a recording."""
     table = read_table(path, ("speed_kmh", "t_first_line", "t_last_line"))
     times = np.sort(np.stack([table.number("t_first_line"), table.number("t_last_line")], axis=1), axis=1)
     return Gates(table.number("speed_kmh"), times)

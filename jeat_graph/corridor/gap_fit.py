@@ -15,7 +15,7 @@ from jeat_graph.association.matching_marginals import MatchingMarginals, matchin
 from jeat_graph.corridor.gap_model import (
     Gap,
     GapParameters,
-    Pairs,
+    PassagePairs,
     candidate_pairs,
     log_ratios,
     residual,
@@ -78,7 +78,7 @@ class FittedGap:
     parameters: GapParameters
     slowness: FloatArray
     shared: Slowness
-    pairs: Pairs
+    pairs: PassagePairs
     marginals: MatchingMarginals
     log_ratio: FloatArray
     covariance: FloatArray
@@ -123,7 +123,12 @@ def _change(old: GapParameters, new: GapParameters) -> float:
 
 
 def _improved(
-    gap: Gap, pairs: Pairs, probability: FloatArray, p: GapParameters, slowness: FloatArray, prior: Prior
+    gap: Gap,
+    pairs: PassagePairs,
+    probability: FloatArray,
+    p: GapParameters,
+    slowness: FloatArray,
+    prior: Prior,
 ) -> tuple[GapParameters, FloatArray, Slowness, FloatArray]:
     """Return the next parameters, the slowness of each passage, what is shared of it, and the covariance."""
     inlier, outlier = time_log_densities(gap, pairs, p, slowness)
@@ -147,7 +152,7 @@ def _improved(
 
 
 def _clock_and_weights(
-    gap: Gap, pairs: Pairs, share: FloatArray, p: GapParameters, slowness: FloatArray, prior: Prior
+    gap: Gap, pairs: PassagePairs, share: FloatArray, p: GapParameters, slowness: FloatArray, prior: Prior
 ) -> tuple[GapParameters, float, FloatArray]:
     """Weighed least squares in the offset, the distance, the weights of the speeds, and the mean slowness.
 
@@ -190,7 +195,7 @@ def _clock_and_weights(
 
 
 def _features(
-    gap: Gap, pairs: Pairs, probability: FloatArray, p: GapParameters, slowness: FloatArray
+    gap: Gap, pairs: PassagePairs, probability: FloatArray, p: GapParameters, slowness: FloatArray
 ) -> GapParameters:
     """Return the parameters with what the pairs say of speeds, lengths, lanes, classes and rates."""
     i, j, total = pairs.i, pairs.j, float(probability.sum())

@@ -33,7 +33,7 @@ _LOG_2PI = math.log(2.0 * math.pi)
 _NEIGHBOURS = 6
 #: Standard deviation of ln travel time of an outlier: a speed that is wrong, a stop.
 OUTLIER_SD = 0.3
-#: Pairs whose ln travel time is further than this from what is expected are never made.
+#: PassagePairs whose ln travel time is further than this from what is expected are never made.
 WINDOW = 0.8
 #: Least density of a feature, as a share of the greatest: what has never been seen may come.
 _LEAST_DENSITY = 0.02
@@ -123,7 +123,7 @@ class Gap:
 
 
 @dataclass(frozen=True, eq=False)
-class Pairs:
+class PassagePairs:
     """E pairs of passages that may be one vehicle.
 
     Attributes:
@@ -139,7 +139,7 @@ class Pairs:
         return len(self.i)
 
 
-def candidate_pairs(gap: Gap, p: GapParameters, slowness: FloatArray, margin_s: float = 0.0) -> Pairs:
+def candidate_pairs(gap: Gap, p: GapParameters, slowness: FloatArray, margin_s: float = 0.0) -> PassagePairs:
     """Return the pairs whose travel time may be that of one vehicle.
 
     Args:
@@ -159,14 +159,14 @@ def candidate_pairs(gap: Gap, p: GapParameters, slowness: FloatArray, margin_s: 
     count = high - low
     i = np.repeat(np.arange(len(gap.before)), count)
     j = np.arange(len(i)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(low, count)
-    pairs = Pairs(i, j)
+    pairs = PassagePairs(i, j)
     travel = gap.after.t[j] - start[i]
     near = travel > 0.0
-    near[near] = np.abs(residual(gap, Pairs(i[near], j[near]), p, slowness)) < WINDOW
-    return Pairs(pairs.i[near], pairs.j[near])
+    near[near] = np.abs(residual(gap, PassagePairs(i[near], j[near]), p, slowness)) < WINDOW
+    return PassagePairs(pairs.i[near], pairs.j[near])
 
 
-def expected_log_time(gap: Gap, pairs: Pairs, p: GapParameters, slowness: FloatArray) -> FloatArray:
+def expected_log_time(gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray) -> FloatArray:
     """Return the ln of the travel time (E,) that each pair would take (s)."""
     i, j = pairs.i, pairs.j
     return np.asarray(
@@ -178,13 +178,13 @@ def expected_log_time(gap: Gap, pairs: Pairs, p: GapParameters, slowness: FloatA
     )
 
 
-def residual(gap: Gap, pairs: Pairs, p: GapParameters, slowness: FloatArray) -> FloatArray:
+def residual(gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray) -> FloatArray:
     """Return e (E,): ln of the travel time less what is expected. Travel times are positive."""
     travel = gap.after.t[pairs.j] - gap.before.t[pairs.i] - p.offset_s
     return np.asarray(np.log(travel) - expected_log_time(gap, pairs, p, slowness))
 
 
-def residual_variance(gap: Gap, pairs: Pairs, p: GapParameters) -> FloatArray:
+def residual_variance(gap: Gap, pairs: PassagePairs, p: GapParameters) -> FloatArray:
     """Return the variance (E,) of e of no outlier: s² and what the errors of times and speeds add."""
     i, j = pairs.i, pairs.j
     travel = gap.after.t[j] - gap.before.t[i] - p.offset_s
@@ -193,7 +193,7 @@ def residual_variance(gap: Gap, pairs: Pairs, p: GapParameters) -> FloatArray:
     return np.asarray(p.spread**2 + times + speeds)
 
 
-def log_ratios(gap: Gap, pairs: Pairs, p: GapParameters, slowness: FloatArray) -> FloatArray:
+def log_ratios(gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray) -> FloatArray:
     """Return the log ratio (E,) of "one vehicle" to "both alone" of each pair."""
     i, j = pairs.i, pairs.j
     travel = gap.after.t[j] - gap.before.t[i] - p.offset_s
@@ -208,7 +208,7 @@ def log_ratios(gap: Gap, pairs: Pairs, p: GapParameters, slowness: FloatArray) -
 
 
 def time_log_densities(
-    gap: Gap, pairs: Pairs, p: GapParameters, slowness: FloatArray
+    gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return ln of both parts (E,) of the density of e: what goes with the traffic, and outliers."""
     e = residual(gap, pairs, p, slowness)
@@ -225,7 +225,7 @@ def within(gap: Gap, p: GapParameters, slowness: FloatArray) -> FloatArray:
     return np.clip(ndtr((end - arrival) / sd) - ndtr((start - arrival) / sd), 1e-3, 1.0 - 1e-3)
 
 
-def _speed_ratio(gap: Gap, pairs: Pairs, p: GapParameters) -> FloatArray:
+def _speed_ratio(gap: Gap, pairs: PassagePairs, p: GapParameters) -> FloatArray:
     """Return ln p(z_j | z_i) / p(z_j); p(z_j) is normal."""
     z_i, z_j = gap.own_before[pairs.i], gap.own_after[pairs.j]
     error = gap.after.sigma_speed[pairs.j] ** 2 + (p.carry * gap.before.sigma_speed[pairs.i]) ** 2
@@ -234,7 +234,7 @@ def _speed_ratio(gap: Gap, pairs: Pairs, p: GapParameters) -> FloatArray:
     return np.asarray(joined - apart)
 
 
-def _length_ratio(gap: Gap, pairs: Pairs, p: GapParameters) -> FloatArray:
+def _length_ratio(gap: Gap, pairs: PassagePairs, p: GapParameters) -> FloatArray:
     """Return ln p(length_j | length_i) / p(length_j), 0 where unknown; p(length_j) is a kernel density."""
     i, j = pairs.i, pairs.j
     lengths = gap.after.log_length

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("jeat_graph_sehn")
 
-from jeat_graph_sehn.simulation.corridor.traffic import TrafficConfig
+from jeat_graph_sehn.simulation.corridor.traffic import CorridorTraffic
 from jeat_graph_sehn.simulation.corridor.writing import write_corridor_world
 
 
@@ -14,7 +14,7 @@ from jeat_graph_sehn.simulation.corridor.writing import write_corridor_world
 def road(tmp_path_factory):
     """Three cameras in 5 minutes of 1800 vehicles an hour: folders A, B, C, and what is true."""
     out = tmp_path_factory.mktemp("corridor")
-    config = TrafficConfig(300.0, 1800.0, places_m=(0.0, 300.0, 700.0), leave=0.05, join=0.05)
+    config = CorridorTraffic(300.0, 1800.0, places_m=(0.0, 300.0, 700.0), leave=0.05, join=0.05)
     write_corridor_world(config, 11, out)
     return out
 
@@ -23,5 +23,5 @@ def road(tmp_path_factory):
 def other_road(tmp_path_factory):
     """Two cameras of another road."""
     out = tmp_path_factory.mktemp("other")
-    write_corridor_world(TrafficConfig(300.0, 1800.0, places_m=(0.0, 300.0)), 12, out)
+    write_corridor_world(CorridorTraffic(300.0, 1800.0, places_m=(0.0, 300.0)), 12, out)
     return out

@@ -339,7 +339,7 @@ def _rig(given: str | None) -> RigConfig | str | None:
 def _corridor(args: argparse.Namespace) -> int:
     """Simulate a road with several cameras and write what `road` would write of each."""
     from jeat_graph.io.files.outputs import check_folder
-    from jeat_graph_sehn.simulation.corridor.traffic import TrafficConfig
+    from jeat_graph_sehn.simulation.corridor.traffic import CorridorTraffic
     from jeat_graph_sehn.simulation.corridor.writing import write_corridor_world
 
     other = [
@@ -351,7 +351,7 @@ def _corridor(args: argparse.Namespace) -> int:
     check_folder(args.out)
     ramps = 0.04 if args.ramps is None else args.ramps
     start, end = (0.0, 0.0) if args.queue is None else args.queue
-    config = TrafficConfig(
+    config = CorridorTraffic(
         duration_s=_CORRIDOR_DURATION_S if args.duration is None else args.duration,
         flow_per_h=2400.0 if args.flow is None else args.flow,
         places_m=(0.0, 500.0) if args.cameras is None else args.cameras,

@@ -39,7 +39,7 @@ _KIND_SHARES = (0.03, 0.82, 0.15)
 
 
 @dataclass(frozen=True)
-class TrafficConfig:
+class CorridorTraffic:
     """What drives.
 
     Attributes:
@@ -81,7 +81,7 @@ class Driven(NamedTuple):
     kind: IntArray
 
 
-def drive(config: TrafficConfig, rng: np.random.Generator) -> Driven:
+def drive(config: CorridorTraffic, rng: np.random.Generator) -> Driven:
     """Simulate the traffic from before the first camera to beyond the last."""
     places = np.asarray(config.places_m, dtype=np.float64)
     road = _Road(config, places, rng)
@@ -95,7 +95,7 @@ def drive(config: TrafficConfig, rng: np.random.Generator) -> Driven:
 class _Road:
     """The state of all vehicles, and what it does in a step."""
 
-    def __init__(self, config: TrafficConfig, places: FloatArray, rng: np.random.Generator) -> None:
+    def __init__(self, config: CorridorTraffic, places: FloatArray, rng: np.random.Generator) -> None:
         self.config, self.places, self.rng = config, places, rng
         enter, lane = self._entries(config.flow_per_h / 3600.0, _LANE_SHARES)
         start = np.full(len(enter), places[0] - _BEFORE_M)

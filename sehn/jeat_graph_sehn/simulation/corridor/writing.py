@@ -11,14 +11,14 @@ import yaml
 from jeat_graph.io.files.atomic import open_atomic
 from jeat_graph.io.tables.table_writer import write_columns
 from jeat_graph_sehn.simulation.corridor.cameras import CameraErrors, Seen, see, write_seen
-from jeat_graph_sehn.simulation.corridor.traffic import KINDS, Driven, TrafficConfig, drive
+from jeat_graph_sehn.simulation.corridor.traffic import KINDS, CorridorTraffic, Driven, drive
 
 #: The clocks of all cameras but the first are off by at most so much (s).
 _CLOCK_S = 60.0
 
 
 def simulate_corridor(
-    config: TrafficConfig, seed: int, errors: CameraErrors | None = None
+    config: CorridorTraffic, seed: int, errors: CameraErrors | None = None
 ) -> tuple[Driven, list[Seen], list[float]]:
     """Return the traffic, what each camera says, and how far each clock is ahead of the first (s)."""
     errors = errors or CameraErrors()
@@ -28,7 +28,7 @@ def simulate_corridor(
     return driven, [see(driven, k, clock, errors, rng) for k, clock in enumerate(clocks)], clocks
 
 
-def write_corridor_world(config: TrafficConfig, seed: int, out: Path) -> list[Path]:
+def write_corridor_world(config: CorridorTraffic, seed: int, out: Path) -> list[Path]:
     """Simulate and write; return the cameras' folders.
 
     Beside them stand `truth.csv` (camera, track_id, vehicle, true time, class; vehicle −1 is nothing) and
