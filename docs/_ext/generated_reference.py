@@ -1,4 +1,4 @@
-"""Pages of the reference made from the code: commands, settings, and what is registered by a record.
+"""Pages of the reference made from the code: commands, settings, and what records register.
 
 The build of the documentation writes them, and so does `python docs/_ext/generated_reference.py`. Those of
 the settings and of the records are kept in the repository, for those who read the pages there.
@@ -102,6 +102,31 @@ def configuration_page() -> str:
         out.append("")
         out += _inner_sections(title, section)
     return "\n".join(out)
+
+
+_ABOUT_LAYOUTS = """# Layouts of networks' outputs
+
+Made from the records in `jeat_graph/detection/models/layouts`, a file for each family. The metadata of the
+network's file (`task`, `names`, `imgsz`, `end2end`, `nms` of `args`) decides first which layout it has, the
+shapes of its outputs second, and their names last. A file that leaves shapes open is run once to see them. A
+layout that contradicts metadata or shapes is refused, also where `layout` asks for it.
+
+`C` is the number of classes, `N` of cells or three times as many, `K` of detections, `R` of bins. Boxes below
+the least score are left out, as the networks' own tools do; a box of the even score is as likely real as not.
+"""
+
+
+def layouts_page() -> str:
+    """Write every layout of networks' outputs, from its record, as Markdown."""
+    from jeat_graph.detection.models.layouts.registry import all_layouts
+
+    head = "| layout | detectors | outputs | fed with | least score | even score |\n|---|---|---|---|--:|--:|"
+    rows = [
+        f"| `{one.name}` | {one.detectors} | {one.outputs} | {one.feed.words} | {one.least_score:g} | "
+        f"{one.even_score:g} |"
+        for one in all_layouts().values()
+    ]
+    return "\n".join([_ABOUT_LAYOUTS, head, *rows, ""])
 
 
 def _inner_sections(title: str, section: Any) -> list[str]:
@@ -215,6 +240,7 @@ def write_pages(folder: Path) -> None:
         "commands.md": commands_page(),
         "configuration.md": configuration_page(),
         "registered.md": records_page(),
+        "layouts.md": layouts_page(),
     }
     for name, text in pages.items():
         path = folder / name

@@ -2,7 +2,7 @@
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
 configuration: `rate_hz`, `even_score`). Of a foreign network of pictures without such a file, the layout of
-its outputs tells what its scores mean (`ModelSettings.even_score`).
+its outputs tells what its scores mean (`even_score` of `models.layouts`).
 """
 
 from __future__ import annotations
@@ -10,22 +10,22 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 from jeat_graph.config.section_tree import build, read_tree
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR
+from jeat_graph.detection.models.engine import open_engine
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
-from jeat_graph.detection.models.output_reader import layout_of
+from jeat_graph.detection.models.recognising import layout_of, network_of, recognised
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.request import DetectRequest
 from jeat_graph.io.tables.sensor_columns import Said
 
 _SUFFIX = ".tracking.yaml"
-#: Sides of a picture: batch, colours, height, width.
-_PICTURE = 4
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
 
 
@@ -115,16 +115,16 @@ def _even_by_layout(
         head = read_onnx_head(network)
         if CARD in head.notes:
             return None
-        picture = next((port.shape for port in head.inputs if len(port.shape) == _PICTURE), None)
-        height, width = (None, None) if picture is None else picture[2:]
-        open_width, open_height = reading.open_side
-        side = (width or open_width, height or open_height)
-        layout = layout_of(head.outputs, side, head.notes, reading.layout, network)
+        engine = cache(lambda: open_engine(network, head, reading.backend, reading.threads))
+        found = recognised(network, head, reading, lambda inputs: engine().run(inputs))
+        layout, _ = layout_of(
+            network_of(found.outputs, found.side, head.notes, network), reading.layout, network
+        )
     except DataError:  # who detects says what is wrong with it
         return None
-    even = reading.even_score(layout)
+    even = layout.even_score
     say(
         f"sensor {sensor!r}: a box of score {even:g} is taken to be as likely real as not, as of the layout "
-        f"{layout} (--set sensors.{sensor}.even_score=… says otherwise; any other --config: not)"
+        f"{layout.name} (--set sensors.{sensor}.even_score=… says otherwise; any other --config: not)"
     )
     return even

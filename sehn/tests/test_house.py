@@ -45,7 +45,7 @@ PUBLIC = {
     "jeat_graph.detection.models.class_names",
     "jeat_graph.detection.models.event_places",
     "jeat_graph.detection.models.feeding",
-    "jeat_graph.detection.models.layouts",
+    "jeat_graph.detection.models.layouts.registry",
     "jeat_graph.detection.models.model_settings",
     "jeat_graph.detection.models.onnx_head",
     "jeat_graph.detection.named",

@@ -243,6 +243,11 @@ def test_the_page_of_records_in_the_repository_is_that_of_the_code():
     assert kept == made_from_the_code().records_page(), "run python docs/_ext/generated_reference.py"
 
 
+def test_the_page_of_layouts_in_the_repository_is_that_of_the_records():
+    kept = (ROOT / "docs" / "reference" / "layouts.md").read_text(encoding="utf-8")
+    assert kept == made_from_the_code().layouts_page(), "run python docs/_ext/generated_reference.py"
+
+
 def test_the_page_of_settings_has_what_a_run_takes_without_being_told():
     """The generated page shows the values of the preset `default`, with unit and meaning."""
     text = made_from_the_code().configuration_page()

@@ -6,7 +6,7 @@ import numpy as np
 
 from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.detection.models.layouts import DecodedBoxes
+from jeat_graph.detection.models.layouts.record import DecodedBoxes
 
 _CENTRES_PX = 1e-3
 #: Boxes that are compared each with each; of more, the best. The others are hardly ever detections.

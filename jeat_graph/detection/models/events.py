@@ -18,6 +18,7 @@ from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
+from jeat_graph.detection.models.recognising import given_shapes
 from jeat_graph.detection.settings import USUAL_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
 
@@ -83,10 +84,11 @@ class ModelEventDetector(BinnedDetector):
         super().__init__(size_px, sensor, rate_hz, ring, bins, times)
         self._by_polarity = _by_polarity(self._settings.channels, head)
         self._memory, outputs = _memory(head, self._path, self._beside)
-        self._outputs = OutputReader(outputs, self._side, head.notes, self._settings, self._path, coco=False)
-        self._read = [port.name for port in outputs]
         self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
         self._state: dict[str, npt.NDArray[Any]] = {}
+        outputs = given_shapes(outputs, lambda: self._engine.run(self._blank(head)))
+        self._outputs = OutputReader(outputs, self._side, head.notes, self._settings, self._path, coco=False)
+        self._read = [port.name for port in outputs]
         kept = f", {len(self._memory)} states kept" if self._memory else ""
         order = "polarity" if self._by_polarity else "time"
         self.description = (
@@ -123,6 +125,17 @@ class ModelEventDetector(BinnedDetector):
     def _empty_window(self) -> npt.NDArray[Any]:
         shape = (1, self._input.shape[1] or 0, self._side[1], self._side[0])
         return np.zeros(shape, dtype=self._input.kind)
+
+    def _blank(self, head: OnnxHead) -> dict[str, npt.NDArray[Any]]:
+        """Return inputs of nothing, to see what the network gives."""
+        width, height = self._side
+        blank = {self._input.name: self._empty_window()}
+        for port in head.inputs[1:]:
+            sides = [side or 1 for side in port.shape]
+            if port.name in self._beside and len(sides) == len(self._input.shape):
+                sides[2:] = [height, width]  # a picture is as large as the windows
+            blank[port.name] = np.zeros(sides, dtype=port.kind)
+        return blank
 
     def _scan(self, t: float, window: npt.NDArray[Any], beside: dict[str, npt.NDArray[Any]]) -> Scan:
         """Run the network on a window that ends at t (s), and on what goes with it."""

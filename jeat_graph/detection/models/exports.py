@@ -10,7 +10,9 @@
 `classify`  a score for each class of the whole picture       refused: it has no boxes
 ==========  ================================================  ==============================================
 
-Rows of exports that suppress by themselves are a box, its score, its class, and then the same.
+Rows of exports that suppress by themselves are a box, its score, its class, and then the same. Whether an
+export does is said by `end2end` and by `nms` of its `args`; `imgsz` is the size of its input where the file
+leaves that open.
 """
 
 from __future__ import annotations
@@ -29,6 +31,9 @@ _TASKS = (DETECT, SEGMENT, POSE, TURNED)
 #: Numbers of a box, and of a row of an export that suppresses by itself.
 BOX, ROW = 4, 6
 _MASK_FACTORS = 32
+#: Sides of an output of masks: batch, factors, height, width.
+_MASK_SIDES = 4
+_LARGEST_SIDE = 8192
 # Key points of COCO's people, each with two coordinates and whether it is seen; one class.
 _PEOPLE_POINTS = 17 * 3
 
@@ -41,12 +46,33 @@ class Export(NamedTuple):
         classes: how many classes it names; None where it names none.
         more: numbers behind the class scores of a row; None where nobody knows.
         rtdetr: whether it is Ultralytics' RT-DETR, whose boxes are centres and sizes in shares.
+        task_said: whether the notes say the task.
+        suppressed: whether the network suppresses by itself; None where the notes do not say it.
+        asked: whether the user says the layout: then a file without notes is what it is said to be.
     """
 
     task: str
     classes: int | None
     more: int | None
     rtdetr: bool
+    task_said: bool = False
+    suppressed: bool | None = None
+    asked: bool = False
+
+    @property
+    def behind(self) -> int:
+        """Numbers behind the class scores of a row, 0 where nobody knows."""
+        return self.more or 0
+
+    @property
+    def said(self) -> str:
+        """Say for messages what the notes say; empty where they say nothing."""
+        words = [f"task {self.task}"] if self.task_said else []
+        words += [] if self.classes is None else [f"{self.classes} classes"]
+        if self.suppressed is not None:
+            words.append("suppression by itself" if self.suppressed else "no suppression by itself")
+        words += ["RT-DETR"] if self.rtdetr else []
+        return f"; its notes say {', '.join(words)}" if words else ""
 
     @property
     def words(self) -> str:
@@ -70,12 +96,52 @@ def export_of(outputs: Sequence[Port], notes: Mapping[str, str]) -> Export:
         raise DataError(f"is an export of the task {task!r}, which gives no boxes; export a detector")
     names = class_names(notes)
     points = _points(notes)
-    masks = next((port.shape[1] for port in outputs if len(port.shape) == BOX), None)
+    masks = next((port.shape[1] for port in outputs if len(port.shape) == _MASK_SIDES), None)
     if not task:
         task = POSE if points else SEGMENT if masks else DETECT
     more = {DETECT: 0, TURNED: 1, SEGMENT: masks or _MASK_FACTORS, POSE: points or _PEOPLE_POINTS}[task]
     said = f"{notes.get('head', '')} {notes.get('description', '')}".lower().replace("-", "")
-    return Export(task, len(names) or None, more, "rtdetr" in said)
+    return Export(
+        task,
+        len(names) or None,
+        more,
+        "rtdetr" in said,
+        task_said=bool(notes.get("task", "").strip()),
+        suppressed=_suppressed(notes),
+    )
+
+
+def noted_side(notes: Mapping[str, str]) -> tuple[int, int] | None:
+    """Return the width and height of the input (px) that the notes say, None where they say none."""
+    said = _literal(notes.get("imgsz", ""))
+    sides = [said, said] if isinstance(said, int) else said
+    if not isinstance(sides, list | tuple) or len(sides) != 2:
+        return None
+    if not all(isinstance(side, int) and 0 < side <= _LARGEST_SIDE for side in sides):
+        return None
+    height, width = sides
+    return width, height
+
+
+def _suppressed(notes: Mapping[str, str]) -> bool | None:
+    """Return whether the notes say that the network suppresses by itself; None where they leave it open.
+
+    `nms` alone leaves it open: YOLOv10 has none, and needs none.
+    """
+    arguments = _literal(notes.get("args", ""))
+    nms = arguments.get("nms") if isinstance(arguments, Mapping) else _literal(notes.get("nms", ""))
+    end_to_end = _literal(notes.get("end2end", "").strip().capitalize())
+    if nms is True or end_to_end is True:
+        return True
+    return False if nms is False and end_to_end is False else None
+
+
+def _literal(text: str) -> object:
+    """Return what a note says in Python's words, None where it is nothing of that kind."""
+    try:
+        return ast.literal_eval(text)
+    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+        return None
 
 
 def class_channels(channels: int, export: Export) -> int:
@@ -89,6 +155,8 @@ def class_channels(channels: int, export: Export) -> int:
         DataError: what the file says of its classes and of its outputs does not go together.
     """
     count = channels - BOX - (export.more or 0)
+    if export.classes is None and export.asked:
+        return channels - BOX - (export.task == TURNED)
     if export.classes is None and export.task == DETECT and channels == BOX + 1 + _PEOPLE_POINTS:
         raise DataError(
             f"has {channels} numbers a row and no notes: those of a pose of one class, or 52 classes; say "
@@ -104,7 +172,6 @@ def class_channels(channels: int, export: Export) -> int:
 
 def _points(notes: Mapping[str, str]) -> int:
     """Return how many numbers the key points of a row are; 0 where the file says nothing of any."""
-    try:
-        return math.prod(int(side) for side in ast.literal_eval(notes.get("kpt_shape", "")))
-    except (ValueError, SyntaxError, TypeError):
-        return 0
+    shape = _literal(notes.get("kpt_shape", ""))
+    sides = shape if isinstance(shape, list | tuple) else []
+    return math.prod(sides) if sides and all(isinstance(side, int) and side > 0 for side in sides) else 0

@@ -8,38 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.detection.models.layouts.record import Feed
+from jeat_graph.detection.models.layouts.registry import all_layouts
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.io.media.decoders import RgbImage
 
 #: Grey level beside a picture that is smaller than the input, and white.
 _FILL, _WHITE = np.float32(114.0), np.float32(255.0)
 _LEVELS = 256
-_IMAGENET_MEAN, _IMAGENET_STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
-
-
-class Feed(NamedTuple):
-    """How pictures become input.
-
-    Attributes:
-        rgb: whether red comes first; else blue.
-        fit: `letterbox`, `letterbox-centre` or `stretch`.
-        scale: a grey level is multiplied by it,
-        mean: then this is taken off, in the order of the colours,
-        std: and it is divided by this.
-        pad: grey level of letterboxes.
-    """
-
-    rgb: bool
-    fit: str
-    scale: float
-    mean: tuple[float, ...]
-    std: tuple[float, ...]
-    pad: float
-
-    def __str__(self) -> str:
-        order = "RGB" if self.rgb else "BGR"
-        shift = f", mean {list(self.mean)}, std {list(self.std)}" if any(self.mean) else ""
-        return f"{order}, {self.fit}, scale {self.scale:.4g}{shift}"
 
 
 class Letterbox(NamedTuple):
@@ -59,27 +35,14 @@ class Letterbox(NamedTuple):
 
 
 def usual_feed(layout: str, settings: ModelSettings) -> Feed:
-    """Return how networks of a layout are usually fed, with what the settings say instead.
-
-    YOLOX and NanoDet were trained on BGR of 0 to 255, the others on RGB of 0 to 1.
-    """
-    plain = layout in ("yolox", "yolox-raw", "nanodet")
-    fit = {"yolox": "letterbox", "yolox-raw": "letterbox", "nanodet": "stretch"}
-    fit |= {"detr": "stretch", "detr-softmax": "stretch", "boxes": "stretch", "rtdetr": "stretch"}
-    mean: tuple[float, ...] = (0.0, 0.0, 0.0)
-    std: tuple[float, ...] = (1.0, 1.0, 1.0)
-    scale = 1.0 if plain else 1.0 / 255.0
-    if layout == "nanodet":
-        mean, std = _IMAGENET_MEAN[::-1], _IMAGENET_STD[::-1]
-    elif layout == "detr-softmax":
-        mean = tuple(m / 255.0 for m in _IMAGENET_MEAN)
-        std = tuple(s / 255.0 for s in _IMAGENET_STD)
+    """Return how networks of a layout are usually fed, with what the settings say instead."""
+    usual = all_layouts()[layout].feed
     return Feed(
-        rgb=not plain if settings.color == "auto" else settings.color == "rgb",
-        fit=fit.get(layout, "letterbox-centre") if settings.fit == "auto" else settings.fit,
-        scale=scale if settings.scale is None else settings.scale,
-        mean=settings.mean or mean,
-        std=settings.std or std,
+        rgb=usual.rgb if settings.color == "auto" else settings.color == "rgb",
+        fit=usual.fit if settings.fit == "auto" else settings.fit,
+        scale=usual.scale if settings.scale is None else settings.scale,
+        mean=settings.mean or usual.mean,
+        std=settings.std or usual.std,
         pad=settings.pad,
     )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from jeat_graph.config.fields import Section, choice, flag, number
 from jeat_graph.data.errors import ConfigError
+from jeat_graph.detection.models.layouts.registry import all_layouts
 
 #: Overlap (IoU) above which one of two boxes goes, and from which on boxes are averaged: of networks that
 #: `train` made (chosen on two of theirs, of pictures and of events, in seeds 1001 and 3001), and of others.
@@ -13,48 +14,21 @@ OWN_OVERLAPS = (0.55, 0.65)
 _OTHERS_OVERLAPS = (0.5, 1.0)
 #: Above this two boxes of different classes are one thing.
 _ACROSS = 0.65
-#: Scores below are left out: of networks that `train` made, whose scores the tracker knows, and of others by
-#: layout, as their own tools have it (Ultralytics `conf`; `demo` of YOLOX and NanoDet; RT-DETR and D-FINE
-#: draw from .4 to .6).
-_OWN_SCORE, _OTHERS_SCORE = 0.1, 0.25
-_SCORES = {
-    "yolox": 0.3,
-    "yolox-raw": 0.3,
-    "nanodet": 0.35,
-    "rtdetr": 0.4,
-    "detr": 0.4,
-    "detr-softmax": 0.5,
-    "boxes": 0.4,
-}
-#: The score at which a box is as likely real as not (`even_score`). All layouts but one learn to score how
-#: well a box will fit: its overlap with the object, and 0 where there is none. Such a score is P(real) times
-#: the mean overlap of boxes that match, .8 to .9, so even is .40 to .45. Measured with truth, by the logistic
-#: regression of `calibrate`: .446 and .450 for boxes of YOLOX in MOT17 and DanceTrack. A softmax over classes
-#: and nothing is the probability itself.
-_EVEN_FIT, _EVEN_PROBABILITY = 0.45, 0.5
-_PROBABLE = ("detr-softmax",)
-LAYOUTS = (
-    "auto",
-    "yolox",
-    "yolox-raw",
-    "yolov5",
-    "yolov8",
-    "yolov8-obb",
-    "end-to-end",
-    "end-to-end-obb",
-    "rtdetr",
-    "detr",
-    "detr-softmax",
-    "boxes",
-    "nanodet",
-)
+#: Scores below are left out of networks that `train` made, whose scores the tracker knows; of others a layout
+#: says it (`layouts.record`).
+_OWN_SCORE = 0.1
+AUTO = "auto"
 
 
 @dataclass(frozen=True)
 class ModelSettings(Section):
     """A network from an ONNX file."""
 
-    layout: str = choice("auto", LAYOUTS, "what its outputs mean; auto: by their names and shapes")
+    layout: str = choice(
+        AUTO,
+        (AUTO, *all_layouts()),
+        "what its outputs mean; auto: by the notes of its file, the shapes and the names of the outputs",
+    )
     backend: str = choice(
         "auto", ("auto", "opencv", "onnxruntime"), "what runs it; auto: onnxruntime if installed, else OpenCV"
     )
@@ -73,8 +47,20 @@ class ModelSettings(Section):
     )
     std: tuple[float, ...] = number((), "grey levels", "then divided by; empty: as usual", open_low=True)
     pad: float = number(114.0, "grey levels", "what letterboxes are filled with", 0.0, 255.0)
-    width: int = number(0, "px", "of the network's input where its file leaves it open; 0: 640", 0, 8192)
-    height: int = number(0, "px", "of the network's input where its file leaves it open; 0: 640", 0, 8192)
+    width: int = number(
+        0,
+        "px",
+        "of the network's input where its file leaves it open; 0: as its notes say, else 640",
+        0,
+        8192,
+    )
+    height: int = number(
+        0,
+        "px",
+        "of the network's input where its file leaves it open; 0: as its notes say, else 640",
+        0,
+        8192,
+    )
     classes: tuple[str, ...] = ()
     score: float | None = number(
         None,
@@ -139,17 +125,17 @@ class ModelSettings(Section):
         """Return `score` of a network that `train` made, or of another with outputs of a layout."""
         if self.score is not None:
             return self.score
-        return _OWN_SCORE if own else _SCORES.get(layout, _OTHERS_SCORE)
+        return _OWN_SCORE if own else all_layouts()[layout].least_score
 
-    @staticmethod
-    def even_score(layout: str) -> float:
-        """Return the score at which a box of a foreign network of pictures is as likely real as not."""
-        return _EVEN_PROBABILITY if layout in _PROBABLE else _EVEN_FIT
+    def open_side(self, noted: tuple[int, int] | None) -> tuple[int, int]:
+        """Return width and height (px) where the shapes leave them open; `noted` is what the notes say."""
+        width, height = noted or (OPEN_SIDE, OPEN_SIDE)
+        return self.width or width, self.height or height
 
     @property
-    def open_side(self) -> tuple[int, int]:
-        """Width and height where the file leaves them open (px)."""
-        return self.width or OPEN_SIDE, self.height or OPEN_SIDE
+    def side_said(self) -> bool:
+        """Whether the user says the size of the input."""
+        return bool(self.width or self.height)
 
 
 #: Width and height of an input that its file leaves open (px).

@@ -14,7 +14,7 @@ from jeat_graph.data.interop import from_xyxy
 from jeat_graph.detection.models.choosing import choose
 from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.feeding import picture_input, place, usual_feed
-from jeat_graph.detection.models.layouts import decode
+from jeat_graph.detection.models.layouts.registry import decode
 from jeat_graph.detection.models.model_settings import OWN_OVERLAPS, ModelSettings
 from jeat_graph.eval.detection_ap import average_precision, match_greedily
 from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Picture

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.detection.models.choosing import choose
-from jeat_graph.detection.models.layouts import DecodedBoxes
+from jeat_graph.detection.models.layouts.record import DecodedBoxes
+from jeat_graph.detection.models.layouts.registry import all_layouts
 from jeat_graph.detection.models.model_settings import ModelSettings
 
 
@@ -157,6 +158,6 @@ def test_even_is_where_half_of_the_boxes_of_a_score_that_learned_overlaps_are_re
     likely = rng.random(200_000)  # P(real) of what a cell shows
     real = rng.random(200_000) < likely
     score = likely * np.clip(rng.normal(0.87, 0.08, 200_000), 0.0, 1.0)
-    near = np.abs(score - ModelSettings.even_score("yolox")) < 0.02
+    near = np.abs(score - all_layouts()["yolox"].even_score) < 0.02
     assert real[near].mean() == pytest.approx(0.5, abs=0.04)
-    assert ModelSettings.even_score("detr-softmax") == 0.5  # a probability itself
+    assert all_layouts()["detr-softmax"].even_score == 0.5  # a probability itself

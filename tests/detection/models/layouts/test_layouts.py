@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.models.layouts import cells, decode, is_raw, recognise
+from jeat_graph.detection.models.exports import export_of
+from jeat_graph.detection.models.layouts.numbers import cells
+from jeat_graph.detection.models.layouts.record import Network
+from jeat_graph.detection.models.layouts.registry import decode
+from jeat_graph.detection.models.layouts.registry import recognise as recognise_network
+from jeat_graph.detection.models.layouts.yolox import is_raw
 from jeat_graph.detection.models.onnx_head import Port
 
 SIDE = (128, 96)
@@ -19,12 +24,16 @@ KINDS = np.array([2, 1])
 LOW = 1e-4
 
 
+def recognise(outputs, side, notes):
+    return recognise_network(Network(tuple(outputs), side, export_of(outputs, notes))).name
+
+
 def logit(p):
     return np.log(p / (1 - p))
 
 
 def grid():
-    places, strides = cells(SIDE, STRIDES)
+    places, strides = cells(SIDE)
     return places, strides, (places + 0.5) * strides[:, None]
 
 
@@ -165,7 +174,8 @@ def test_published_shapes_are_recognised():
     assert of(84, 8400) == "yolov8"
     assert of(300, 6) == "end-to-end"
     assert of(8400, 112) == "nanodet"
-    assert recognise([Port("features", (1, 256, 20, 20), "float32")], (640, 640), {}) is None
+    with pytest.raises(DataError, match="of no layout that is known: features"):
+        recognise([Port("features", (1, 256, 20, 20), "float32")], (640, 640), {})
 
 
 def test_outputs_of_another_layout_are_refused_with_their_shapes():
