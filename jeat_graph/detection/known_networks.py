@@ -2,7 +2,8 @@
 
 Only networks with permissive licences of code and weights. An address is one that the network's own README
 or release page gives; where none of them gives an ONNX file, `how` says how one is made. `average_precision`
-is that of COCO (AP50:95, per cent), from the same page.
+is that of COCO (AP50:95, per cent), from the same page. The SHA-256 of all files with an address are pinned,
+as several independent public projects that fetch the same files pin them.
 """
 
 from __future__ import annotations
@@ -73,9 +74,18 @@ KNOWN = {
             32.8,
             5.06,
             f"{_YOLOX_FILES}/yolox_tiny.onnx",
+            ("427cc366d34e27ff7a03e2899b5e3671425c262ea2291f88bb942bc1cc70b0f7",),
         ),
         KnownNetwork(
-            "yolox-s", "yolox_s.onnx", _YOLOX, _APACHE, 640, 40.5, 9.0, f"{_YOLOX_FILES}/yolox_s.onnx"
+            "yolox-s",
+            "yolox_s.onnx",
+            _YOLOX,
+            _APACHE,
+            640,
+            40.5,
+            9.0,
+            f"{_YOLOX_FILES}/yolox_s.onnx",
+            ("c5c2d13e59ae883e6af3b45daea64af4833a4951c92d116ec270d9ddbe998063",),
         ),
         # AP: README.md of its repository, which gives checkpoints, and its releases for all else.
         KnownNetwork(
@@ -98,7 +108,8 @@ KNOWN = {
             416,
             30.4,
             1.17,
-            how=f"take its ONNX file from {_NANODET}/releases",
+            f"{_NANODET}/releases/download/v1.0.0-alpha-1/nanodet-plus-m_416.onnx",
+            ("59d2f166088889c902f523bf08079391993491324f0d84847e3c4016a8f7cc3d",),
         ),
         # AP and checkpoints: rtdetrv2_pytorch/README.md.
         KnownNetwork(

@@ -2,7 +2,8 @@
 
 They lie in `jeat-graph/networks` of the user's cache (`XDG_CACHE_HOME`, else `~/.cache`), or where
 `JEAT_GRAPH_NETWORKS` says. `JEAT_GRAPH_MIRROR` is the address of a folder that has the same files.
-A file without a pinned SHA-256 is trusted at its first use; its hash is kept beside it (`FILE.sha256`).
+A file without a pinned SHA-256 is trusted at its first use, if it is an ONNX file at all and came by https;
+its hash is kept beside it (`FILE.sha256`). A redirect never leads from https to anything else.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import http.client
 import os
 import sys
+import urllib.parse
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,6 +23,7 @@ from jeat_graph.data.notes import note
 from jeat_graph.data.private_folder import is_private
 from jeat_graph.data.secrets import without_logins
 from jeat_graph.detection.known_networks import KnownNetwork
+from jeat_graph.detection.models.onnx_head import read_onnx_head
 from jeat_graph.io.files.atomic import atomic_path
 from jeat_graph.io.files.hashing import sha256_of
 from jeat_graph.io.files.locking import hold_file
@@ -31,6 +34,8 @@ _PIECE = 1 << 18
 # No detector that runs beside a camera is larger (bytes).
 _LARGEST = 1 << 30
 _PATIENCE_S = 30.0
+#: Hosts to which there is no way that somebody else could change.
+_THIS_MACHINE = ("127.0.0.1", "localhost", "::1")
 
 
 def cache_folder() -> Path:
@@ -91,8 +96,10 @@ def _fetch(network: KnownNetwork, address: str, place: Path) -> None:
     if not is_private(place.parent):
         raise DataError("others can write this folder: networks are not kept in it", place.parent)
     try:
+        _check_way(address, pinned=bool(network.sha256))
         with _opened(address) as answer, atomic_path(place) as temporary:
             _copy(answer, temporary)
+            _check_network(network, temporary, shown)
             _check(network, temporary, sha256_of(temporary), shown)
     except DataError:
         raise
@@ -103,12 +110,36 @@ def _fetch(network: KnownNetwork, address: str, place: Path) -> None:
         ) from None
 
 
+def _check_way(address: str, *, pinned: bool) -> None:
+    """Refuse an address of which anybody on the way can change what comes, where nothing else would tell."""
+    scheme, host = urllib.parse.urlsplit(address).scheme, urllib.parse.urlsplit(address).hostname
+    if scheme not in ("https", "http"):
+        raise ValueError("no address of the web")
+    if scheme == "http" and not pinned and host not in _THIS_MACHINE:
+        raise ValueError("no SHA-256 of it is known, so it is fetched by https only")
+
+
+def _check_network(network: KnownNetwork, path: Path, source: str) -> None:
+    """Refuse what is no ONNX file, such as a page that asks to log in: it is not kept."""
+    try:
+        read_onnx_head(path)
+    except DataError as error:
+        raise DataError(f"what came from {source} {error.message}: it is not {network.name}") from None
+
+
+class _Redirects(urllib.request.HTTPRedirectHandler):
+    """Follows redirects, but from https to https only."""
+
+    def redirect_request(self, req: Any, fp: Any, code: int, msg: str, headers: Any, newurl: str) -> Any:
+        if req.full_url.startswith("https:") and not newurl.startswith("https:"):
+            raise ValueError("it is redirected from https to another way")
+        return super().redirect_request(req, fp, code, msg, headers, newurl)
+
+
 @contextmanager
 def _opened(address: str) -> Iterator[Any]:
-    if not address.startswith(("https://", "http://")):
-        raise ValueError("no address of the web")
     request = urllib.request.Request(address, headers={"User-Agent": "jeat-graph"})
-    with urllib.request.urlopen(request, timeout=_PATIENCE_S) as answer:
+    with urllib.request.build_opener(_Redirects).open(request, timeout=_PATIENCE_S) as answer:
         yield answer
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import hashlib
 import http.server
 import re
+import tempfile
 import threading
+import urllib.request
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +21,24 @@ from jeat_graph.detection.known_networks import KNOWN
 from jeat_graph.detection.named import network_file
 from jeat_graph.detection.network_cache import cached, fetched
 
-TINY = KNOWN["yolox-tiny"]
-CONTENT = b"as good as any network" * 50_000
+pytest.importorskip("onnx", reason="pip install onnx")
+
+from .models.tiny import constant_net
+
+#: A network whose file nobody has pinned.
+TINY = KNOWN["yolox-tiny"]._replace(sha256=())
+#: One with an address and a pin.
+PINNED = KNOWN["yolox-tiny"]
+
+
+def _network() -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        return constant_net(
+            Path(folder) / "n.onnx", {"output": np.ones((1, 252, 85))}, (128, 96)
+        ).read_bytes()
+
+
+CONTENT = _network()
 
 
 class _Server(http.server.BaseHTTPRequestHandler):
@@ -41,7 +60,8 @@ class _Server(http.server.BaseHTTPRequestHandler):
 
 @pytest.fixture
 def internet(tmp_path, monkeypatch):
-    """A server, and a cache of one's own."""
+    """A server, and a cache of one's own; the smallest YOLOX has no pin here."""
+    monkeypatch.setitem(KNOWN, TINY.name, TINY)
     handler = type("Handler", (_Server,), {})
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -181,6 +201,36 @@ def test_networks_that_are_here_are_timed(without_login, tmp_path, capsys):
     assert main(["detectors"]) == 0
     row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("yolox-tiny"))
     assert " here " in row
+
+
+def test_a_page_that_asks_to_log_in_is_no_network(without_login):
+    handler, folder, _ = without_login
+    for content in (b"<html>log in</html>", b"", CONTENT[:2000]):
+        handler.content = content
+        with pytest.raises(DataError, match=r"what came from http.*ONNX.*: it is not yolox-tiny"):
+            fetched(TINY)
+    assert not folder.exists() or not list(folder.iterdir())
+
+
+def test_a_network_that_nobody_pinned_comes_by_https_only(internet, monkeypatch):
+    monkeypatch.setenv(network_cache.MIRROR, "http://192.0.2.1/nets")
+    with pytest.raises(DataError, match="no SHA-256 of it is known, so it is fetched by https only"):
+        fetched(TINY)
+
+
+def test_a_redirect_from_https_to_http_is_not_followed():
+    asked = urllib.request.Request("https://example.com/a.onnx")
+    redirects = network_cache._Redirects()
+    with pytest.raises(ValueError, match="redirected from https to another way"):
+        redirects.redirect_request(asked, None, 302, "Found", {}, "http://example.com/a.onnx")
+    onward = redirects.redirect_request(asked, None, 302, "Found", {}, "https://cdn.example.com/a.onnx")
+    assert onward.full_url == "https://cdn.example.com/a.onnx"
+
+
+def test_what_the_release_pages_give_is_pinned():
+    assert all(network.sha256 for network in KNOWN.values() if network.address)
+    assert PINNED.sha256
+    assert KNOWN["nanodet-plus-m-416"].address
 
 
 def test_every_known_network_has_a_licence_and_a_way_to_get_it():

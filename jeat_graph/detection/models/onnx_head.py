@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.detection.models.onnx_external import check_external
+from jeat_graph.detection.models.protobuf import fields
 
 # Numbers of the fields: ModelProto, GraphProto, TensorProto, ValueInfoProto, TypeProto and below.
 _GRAPH, _NOTES = 7, 14
 _INITIALIZER, _INPUT, _OUTPUT = 5, 11, 12
 _TENSOR_NAME = 8
 _NAME, _TYPE, _TENSOR, _KIND, _SHAPE, _DIMENSION, _VALUE = 1, 2, 1, 1, 2, 1, 1
-_VARINT, _FIXED_64, _BYTES, _FIXED_32 = 0, 1, 2, 5
 _KINDS = {1: "float32", 2: "uint8", 6: "int32", 7: "int64", 10: "float16", 11: "float64"}
 _MOST_BYTES = 1 << 31
 #: Note of a network that `train` made: its card.
@@ -50,7 +51,7 @@ def read_onnx_head(path: str | Path) -> OnnxHead:
     """Read what a file says of itself.
 
     Raises:
-        DataError: no such file, or no ONNX.
+        DataError: no such file, no ONNX, or one whose numbers lie outside its folder.
     """
     place = Path(path)
     if not place.is_file():
@@ -63,16 +64,17 @@ def read_onnx_head(path: str | Path) -> OnnxHead:
         inputs: list[Port] = []
         outputs: list[Port] = []
         valued: set[str] = set()
-        for number, value in _fields(model):
+        for number, value in fields(model):
             if number == _NOTES and isinstance(value, memoryview):
-                pair = {n: bytes(v).decode() for n, v in _fields(value) if isinstance(v, memoryview)}
+                pair = {n: bytes(v).decode() for n, v in fields(value) if isinstance(v, memoryview)}
                 notes[pair.get(1, "")] = pair.get(2, "")
             if number == _GRAPH and isinstance(value, memoryview):
-                for part, content in _fields(value):
+                for part, content in fields(value):
                     if part in (_INPUT, _OUTPUT) and isinstance(content, memoryview):
                         (inputs if part == _INPUT else outputs).append(_port(content))
                     elif part == _INITIALIZER and isinstance(content, memoryview):
                         valued.add(_text(content, _TENSOR_NAME))
+        check_external(model, place)
     except (ValueError, IndexError, UnicodeDecodeError):
         raise DataError("is not an ONNX file that can be read", place) from None
     inputs = [port for port in inputs if port.name not in valued]
@@ -86,54 +88,19 @@ def _port(message: memoryview) -> Port:
     kind = "float32"
     for _, kind_of in _messages(message, _TYPE):
         for _, tensor in _messages(kind_of, _TENSOR):
-            for number, value in _fields(tensor):
+            for number, value in fields(tensor):
                 if number == _KIND and isinstance(value, int):
                     kind = _KINDS.get(value, "unknown")
                 if number == _SHAPE and isinstance(value, memoryview):
                     for _, dimension in _messages(value, _DIMENSION):
-                        sizes = [v for n, v in _fields(dimension) if n == _VALUE and isinstance(v, int)]
+                        sizes = [v for n, v in fields(dimension) if n == _VALUE and isinstance(v, int)]
                         shape.append(sizes[0] if sizes and sizes[0] > 0 else None)
     return Port(_text(message, _NAME), tuple(shape), kind)
 
 
 def _messages(message: memoryview, wanted: int) -> Iterator[tuple[int, memoryview]]:
-    return ((n, v) for n, v in _fields(message) if n == wanted and isinstance(v, memoryview))
+    return ((n, v) for n, v in fields(message) if n == wanted and isinstance(v, memoryview))
 
 
 def _text(message: memoryview, wanted: int) -> str:
     return next((bytes(v).decode() for _, v in _messages(message, wanted)), "")
-
-
-def _fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
-    """Yield number and value of each field: a whole number, or the bytes of what has a length."""
-    at = 0
-    while at < len(message):
-        key, at = _varint(message, at)
-        kind = key & 7
-        if kind == _VARINT:
-            value, at = _varint(message, at)
-            yield key >> 3, value
-            continue
-        if kind == _BYTES:
-            length, at = _varint(message, at)
-        elif kind in (_FIXED_64, _FIXED_32):
-            length = 8 if kind == _FIXED_64 else 4
-        else:
-            raise ValueError("no such kind of field")
-        if at + length > len(message):
-            raise ValueError("a field reaches beyond its message")
-        yield key >> 3, message[at : at + length]
-        at += length
-
-
-def _varint(message: memoryview, at: int) -> tuple[int, int]:
-    value = shift = 0
-    while True:
-        byte = message[at]
-        value |= (byte & 0x7F) << shift
-        at += 1
-        if byte < 0x80:
-            return value, at
-        shift += 7
-        if shift > 63:
-            raise ValueError("a number without an end")
