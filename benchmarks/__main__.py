@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import Any
 
 from jeat_graph.api.beside import HOW_TO_GET
+from jeat_graph.cli.ending import end_with
 from jeat_graph.cli.main import carry_out
 from jeat_graph.cli.options import Parser
 from jeat_graph.cli.terminal import say
@@ -132,4 +133,4 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    end_with(main)

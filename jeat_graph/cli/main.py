@@ -9,10 +9,11 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
-from typing import Any
+from typing import Any, NoReturn
 
 from jeat_graph.api.beside import COMMAND_GROUP, HOW_TO_GET, find
 from jeat_graph.cli import leave_current_folder
+from jeat_graph.cli.ending import end_with
 from jeat_graph.cli.held_outputs import holding
 from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
 from jeat_graph.data.errors import ConfigError, JeatGraphError
@@ -154,6 +155,11 @@ def _run(args: argparse.Namespace) -> int:
     return code
 
 
+def script() -> NoReturn:
+    """Run one command as the program `jeat-graph`, and end the process."""
+    end_with(main)
+
+
 if __name__ == "__main__":
     leave_current_folder()
-    sys.exit(main())
+    script()

@@ -187,16 +187,6 @@ def test_smoothed_has_the_rows_of_the_smoothed_table_of_track(
         last[track] = float(t)
 
 
-# It cannot hold as long as each row is written when it is final: by the default smoother a parked vehicle
-# would hold back the rows of all others until it leaves, in memory and in each checkpoint.
-@pytest.mark.xfail(strict=True, reason="rows of tracks that have ended come before earlier ones of others")
-def test_smoothed_is_in_order_of_time(joint_lines, monkeypatch, capsys, tmp_path):
-    path = tmp_path / "s.csv"
-    assert stream(joint_lines, monkeypatch, capsys, *IMAGE, "--smoothed", path)[0] == 0
-    times = [float(row.split(",")[0]) for row in path.read_text().splitlines()[1:]]
-    assert times == sorted(times)
-
-
 def test_a_scan_that_found_nothing_is_answered_too(monkeypatch, capsys):
     code, out, _ = stream(line(1.5, boxes=[], scores=[]), monkeypatch, capsys)
     assert (code, json.loads(out)) == (0, {"t": 1.5, "tracks": []})

@@ -73,6 +73,8 @@ def test_register_takes_cameras(tmp_path, capsys) -> None:
     assert "the traffic does not tell the clock of evt" in capsys.readouterr().err
     sensor = load_config(rig=out).sensors["evt"]
     assert sensor.image == (640.0, 480.0)
-    np.testing.assert_allclose(
-        np.array(sensor.to_picture), map_between(OWN, COMMON)[0].matrix.ravel(), rtol=1e-6
-    )
+    # Where an optimum lies is known to about the root of a rounding of what is minimised there: thousandths
+    # of a px. Some of the nine numbers of the matrix are less sure, and differ from machine to machine.
+    right = map_between(OWN, COMMON)[0]
+    written = replace(right, matrix=np.reshape(sensor.to_picture, right.matrix.shape))
+    np.testing.assert_allclose(written.boxes(boxes(OWN))[0], right.boxes(boxes(OWN))[0], atol=0.01)
