@@ -65,7 +65,8 @@ def matching_marginals(
     offered = weight * to_row
     total = 1.0 + np.bincount(row, offered, rows)
     pair = offered / total[row]
-    return MatchingMarginals(pair, 1.0 / total, np.maximum(1.0 - np.bincount(column, pair, columns), 0.0))
+    left = np.maximum(1.0 - np.bincount(column, pair, columns), 0.0)
+    return MatchingMarginals(pair, np.asarray(1.0 / total, dtype=np.float64), left)
 
 
 def best_matching(row: IntArray, column: IntArray, gain: FloatArray, rows: int, columns: int) -> BoolArray:

@@ -47,7 +47,7 @@ def pair_scores(over: Handover, first: IntArray, second: IntArray) -> dict[str, 
 def f1(rows: list[dict[str, Any]]) -> float:
     """F1 of pooled `pair_scores`."""
     right, made, common = (sum(row[name] for row in rows) for name in ("right", "made", "common"))
-    return 2.0 * right / max(made + common, 1)
+    return float(2.0 * right / max(made + common, 1))
 
 
 def calibration_error(rows: list[dict[str, Any]]) -> float:

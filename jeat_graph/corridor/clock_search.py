@@ -82,7 +82,7 @@ def find_offset(gap: Gap, distance_m: float, within_s: tuple[float, float]) -> P
     )
     floor = max(float(background.max(initial=0.0)) * _LEAST_OVERLAP, 1e-9)
     excess = (smooth - background) / np.sqrt(np.maximum(background, floor))
-    centre = low + (np.arange(bins) + 0.5) * width
+    centre = np.asarray(low + (np.arange(bins) + 0.5) * width, dtype=np.float64)
     tried = (centre >= within_s[0]) & (centre <= within_s[1]) & (background >= floor)
     if not tried.any():
         tried[np.argmin(np.abs(centre - np.mean(within_s)))] = True

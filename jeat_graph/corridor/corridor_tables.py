@@ -241,7 +241,7 @@ def _ends(corridor: Corridor, first: int, begun: BoolArray) -> Iterator[tuple[in
         fitted = corridor.handovers[last].fitted
         yield last, np.minimum(weight * fitted.marginals.row_alone, 1.0)
         passed_on = weight[fitted.pairs.i] * fitted.marginals.pair
-        weight = np.bincount(fitted.pairs.j, passed_on, len(fitted.gap.after))
+        weight = np.bincount(fitted.pairs.j, passed_on, len(fitted.gap.after)).astype(np.float64)
 
 
 def _counted(corridor: Corridor, slots: Mapping[str, IntArray]) -> dict[tuple[int, str, str], int]:
