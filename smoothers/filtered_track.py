@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.state_rts import FilterRecord
+from jeat_graph.smoothers.state_rts import FilterRecord, rts_step
 
 #: Of a state per axis the first three are place, velocity and acceleration.
 MOTION = 3
@@ -98,67 +98,73 @@ class FilteredTrack:
         Returns:
             Means (T, A, D) and covariances (T, A, D, D).
         """
-        gain = self._gains()
         now = np.maximum(until, at)
         mean, covariance = self.mean[now], self.covariance[now]
         for _ in range(int((now - at).max(initial=0))):
             rows = np.flatnonzero(now > at)
             later, before = now[rows], now[rows] - 1
-            G = gain[before]
-            correction = (mean[rows] - self.predicted_mean[later])[..., None]
-            mean[rows] = self.mean[before] + (G @ correction)[..., 0]
-            spread = covariance[rows] - self.predicted_covariance[later]
-            spread = self.covariance[before] + G @ spread @ np.swapaxes(G, -1, -2)
-            covariance[rows] = (spread + np.swapaxes(spread, -1, -2)) / 2.0
+            mean[rows], covariance[rows] = rts_step(
+                (self.mean[before], self.covariance[before]),
+                self.F[later],
+                (self.predicted_mean[later], self.predicted_covariance[later]),
+                (mean[rows], covariance[rows]),
+            )
             now[rows] = before
         return mean, covariance
 
     def smoothed(self) -> tuple[FloatArray, FloatArray]:
         """Return the states (K, A, D) and covariances (K, A, D, D) that all measurements make."""
-        gain = self._gains()
-        mean, covariance = self.mean.copy(), self.covariance.copy()
-        for k in range(len(self) - 2, -1, -1):
-            G = gain[k]
-            mean[k] += (G @ (mean[k + 1] - self.predicted_mean[k + 1])[..., None])[..., 0]
-            spread = covariance[k] + G @ (covariance[k + 1] - self.predicted_covariance[k + 1]) @ np.swapaxes(
-                G, -1, -2
-            )
-            covariance[k] = (spread + np.swapaxes(spread, -1, -2)) / 2.0
-        return mean, covariance
-
-    def _gains(self) -> FloatArray:
-        """Return G (K − 1, A, D, D) of `state_rts`, solved in a scaled state."""
-        predicted = self.predicted_covariance[1:]
-        scale = np.sqrt(np.diagonal(predicted, axis1=-2, axis2=-1))
-        scaled = predicted / (scale[..., :, None] * scale[..., None, :])
-        forward = (self.F[1:] @ self.covariance[:-1]) / scale[..., :, None]
-        return np.asarray(np.swapaxes(np.linalg.solve(scaled, forward), -1, -2) / scale[..., None, :])
+        return smoothed_together([self])[0]
 
 
-def tracks_of(
-    records: Sequence[FilterRecord], t: Sequence[float], sensors: Sequence[IntArray]
-) -> list[FilteredTrack]:
+def smoothed_together(tracks: Sequence[FilteredTrack]) -> list[tuple[FloatArray, FloatArray]]:
+    """Return the states (K, A, D) and covariances (K, A, D, D) of tracks that all their measurements make.
+
+    The pass goes back over all tracks at once, each from its own last record.
+    """
+    out = [(track.mean.copy(), track.covariance.copy()) for track in tracks]
+    order = sorted(range(len(tracks)), key=lambda i: -len(tracks[i]))
+    for back in range(1, max((len(track) for track in tracks), default=0)):
+        # Those that are longer stand first.
+        active = [i for i in order if len(tracks[i]) > back]
+        at = [len(tracks[i]) - 1 - back for i in active]
+        pairs = list(zip(active, at, strict=True))
+        mean, covariance = rts_step(
+            (
+                np.stack([tracks[i].mean[k] for i, k in pairs]),
+                np.stack([tracks[i].covariance[k] for i, k in pairs]),
+            ),
+            np.stack([tracks[i].F[k + 1] for i, k in pairs]),
+            (
+                np.stack([tracks[i].predicted_mean[k + 1] for i, k in pairs]),
+                np.stack([tracks[i].predicted_covariance[k + 1] for i, k in pairs]),
+            ),
+            (np.stack([out[i][0][k + 1] for i, k in pairs]), np.stack([out[i][1][k + 1] for i, k in pairs])),
+        )
+        for n, (i, k) in enumerate(pairs):
+            out[i][0][k], out[i][1][k] = mean[n], covariance[n]
+    return out
+
+
+def tracks_of(records: Sequence[FilterRecord], t: Sequence[float]) -> list[FilteredTrack]:
     """Return the tracks of a filter's records, in ascending order of identity.
 
     Args:
         records: of successive scans, each with all tracks that lived through it.
         t: of each record (s).
-        sensors: (N,) of each record, which sensor's box each track took in, −1 where it took none.
     """
     if not records:
         return []
     counts = [len(one.track_id) for one in records]
     ids = np.concatenate([one.track_id for one in records])
     order = np.argsort(ids, kind="stable")
-    axes = records[0].mean.shape[1]
     before, before_cov, after, after_cov = (
         np.concatenate([getattr(one, name) for one in records])[order]
         for name in ("predicted_mean", "predicted_covariance", "mean", "covariance")
     )
-    F = np.concatenate([np.broadcast_to(one.F, (len(one.F), axes, *one.F.shape[2:])) for one in records])[
-        order
-    ]
-    times, sensor = np.repeat(t, counts)[order], np.concatenate(sensors)[order]
+    F = np.concatenate([np.broadcast_to(one.F, one.covariance.shape) for one in records])[order]
+    times = np.repeat(t, counts)[order]
+    sensor = np.concatenate([one.sensor for one in records])[order]
     starts = np.flatnonzero(np.diff(ids[order], prepend=-1))
     out = []
     for a, b in zip(starts, [*starts[1:], len(order)], strict=True):

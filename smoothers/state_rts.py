@@ -1,24 +1,29 @@
-"""Rauch–Tung–Striebel smoothing of many tracks at once, over the stored states of a filter.
+"""Rauch–Tung–Striebel smoothing over the stored states of a filter.
 
     G = P F'ᵀ (P⁻')⁻¹,   m_s = m + G (m_s' − m⁻'),   P_s = P + G (P_s' − P⁻') Gᵀ
 
 (Särkkä, *Bayesian Filtering and Smoothing*, eq. 8.6), ' being the next record. Whatever shifts the prediction
 by known amounts (a camera's motion) is in m⁻' and needs no term of its own. Each track has axes that are
 independent of each other; it lives through successive records without a break.
+
+The order of all sums is that of `core/smoothers/state_rts.hpp`, so both round alike: on a long gap the
+condition of P⁻ is 1e10, and of two orders of summation the results would differ by as many roundings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 
+# A pivot that rounding has made negative is this.
+_LEAST_PIVOT = 1e-300
+
 
 class FilterRecord(NamedTuple):
-    """States of all tracks at one update.
+    """States of all tracks at one update: what every engine hands over to the smoothers.
 
     Attributes:
         track_id: (N,) identities, ascending.
@@ -27,6 +32,7 @@ class FilterRecord(NamedTuple):
         predicted_covariance: (N, A, D, D).
         mean: (N, A, D) after it.
         covariance: (N, A, D, D).
+        sensor: (N,) index of the sensor whose box each track took in, −1 where it took none.
     """
 
     track_id: IntArray
@@ -35,59 +41,75 @@ class FilterRecord(NamedTuple):
     predicted_covariance: FloatArray
     mean: FloatArray
     covariance: FloatArray
+    sensor: IntArray
 
 
 def rts_step(
-    mean: FloatArray,
-    covariance: FloatArray,
-    later: FilterRecord,
-    smoothed_mean: FloatArray,
-    smoothed_covariance: FloatArray,
+    state: tuple[FloatArray, FloatArray],
+    F: FloatArray,
+    predicted: tuple[FloatArray, FloatArray],
+    later: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
     """Return the smoothed states of tracks at one record from those at the next.
 
     Args:
-        mean: (N, A, D) filtered.
-        covariance: (N, A, D, D).
-        later: the next record, of the same N tracks.
-        smoothed_mean: (N, A, D) at the next record.
-        smoothed_covariance: (N, A, D, D).
+        state: filtered means (N, A, D) and covariances (N, A, D, D).
+        F: (N, 1 or A, D, D) transitions to the next record.
+        predicted: means and covariances at the next record before its update.
+        later: smoothed means and covariances there.
     """
-    # Solved in a scaled state: variances of position and acceleration differ by orders of magnitude.
-    scale = np.sqrt(np.diagonal(later.predicted_covariance, axis1=2, axis2=3))
-    scaled = later.predicted_covariance / (scale[..., :, None] * scale[..., None, :])
-    forward = (later.F @ covariance) / scale[..., :, None]
-    G = np.linalg.solve(scaled, forward).transpose(0, 1, 3, 2) / scale[..., None, :]
-    out = mean + (G @ (smoothed_mean - later.predicted_mean)[..., None])[..., 0]
-    spread = covariance + G @ (smoothed_covariance - later.predicted_covariance) @ G.transpose(0, 1, 3, 2)
-    return out, (spread + spread.transpose(0, 1, 3, 2)) / 2.0
+    mean, P = _last(state[0]), _last(state[1])
+    D = len(mean)
+    P_predicted = _last(predicted[1])
+    Gt = _transposed_gain(P, _last(np.broadcast_to(F, state[1].shape)), P_predicted)
+    moved = _last(later[0]) - _last(predicted[0])
+    narrower = _last(later[1]) - P_predicted
+    half, more = np.zeros_like(P), np.zeros_like(P)
+    for k in range(D):
+        mean = mean + Gt[k] * moved[k]
+        half += Gt[k][:, None] * narrower[k][None]
+    for k in range(D):
+        more += half[:, k, None] * Gt[k][None]
+    out = P + more
+    for i in range(D):
+        out[i + 1 :, i] = out[i, i + 1 :]
+    return _first(mean, state[0].shape), _first(out, state[1].shape)
 
 
-def smooth(records: Sequence[FilterRecord]) -> Iterator[tuple[int, FloatArray, FloatArray]]:
-    """Smooth all tracks backwards: yield the number of each record, last first, with mean and covariance.
+def _transposed_gain(P: FloatArray, F: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Return Gᵀ = (P⁻)⁻¹ F P (D, D, B) by Cholesky's factor of P⁻ in a scaled state.
 
-    A track's last record is its filtered state.
+    Variances of position and acceleration differ by orders of magnitude.
     """
-    later: FilterRecord | None = None
-    next_mean, next_covariance = np.zeros(0), np.zeros(0)
-    for number in range(len(records) - 1, -1, -1):
-        now = records[number]
-        mean, covariance = now.mean.copy(), now.covariance.copy()
-        if later is not None and len(later.track_id):
-            _, here, there = np.intersect1d(
-                now.track_id, later.track_id, assume_unique=True, return_indices=True
-            )
-            if len(here):
-                chosen = FilterRecord(
-                    later.track_id[there],
-                    later.F[there],
-                    later.predicted_mean[there],
-                    later.predicted_covariance[there],
-                    later.mean[there],
-                    later.covariance[there],
-                )
-                mean[here], covariance[here] = rts_step(
-                    mean[here], covariance[here], chosen, next_mean[there], next_covariance[there]
-                )
-        yield number, mean, covariance
-        later, next_mean, next_covariance = now, mean, covariance
+    D = len(P)
+    scale = 1.0 / np.sqrt(np.stack([predicted[i, i] for i in range(D)]))
+    L = predicted * (scale[:, None] * scale[None])
+    for j in range(D):
+        for k in range(j):
+            L[j:, j] -= L[j:, k] * L[j, k]
+        inverse = 1.0 / np.sqrt(np.maximum(L[j, j], _LEAST_PIVOT))
+        L[j, j] = inverse
+        L[j + 1 :, j] *= inverse
+    out = np.zeros_like(P)
+    for k in range(D):
+        out += F[:, k, None] * P[k][None]
+    for i in range(D):
+        out[i] *= scale[i]
+        for k in range(i):
+            out[i] -= L[i, k] * out[k]
+        out[i] *= L[i, i]
+    for i in range(D - 1, -1, -1):
+        for k in range(i + 1, D):
+            out[i] -= L[k, i] * out[k]
+        out[i] *= L[i, i]
+    return np.asarray(out * scale[:, None])
+
+
+def _last(values: FloatArray) -> FloatArray:
+    """Return arrays (N, A, ...) of tracks as (..., N A): sums go over what stands first."""
+    flat = values.reshape(-1, *values.shape[2:])
+    return np.ascontiguousarray(np.moveaxis(flat, 0, -1))
+
+
+def _first(values: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    return np.ascontiguousarray(np.moveaxis(values, -1, 0)).reshape(shape)

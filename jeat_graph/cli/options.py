@@ -20,7 +20,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 from jeat_graph.config.argument_types import output_rate, picture_size, positive
-from jeat_graph.config.smoothing import ENGINES
+from jeat_graph.config.smoothing import ENGINES, FORMER
 from jeat_graph.data.frame_numbers import FIRST_FRAMES
 from jeat_graph.data.secrets import without_logins
 from jeat_graph.data.tables.frame_filling import SCORE_SCALES
@@ -239,10 +239,10 @@ def add_smoother(parser: argparse.ArgumentParser) -> None:
     """Declare `--smoother`."""
     parser.add_argument(
         "--smoother",
-        choices=ENGINES,
-        help="smoother of smoothed.csv: rts (whole tracks), fixed-lag-rts (with a delay, for live use), full "
-        "and fixed-lag (the same; with the engine `paper` a factor graph in GTSAM), none; default: as the "
-        "configuration says",
+        choices=(*ENGINES, *FORMER),
+        metavar="NAME",
+        help="smoother of smoothed.csv: full (whole tracks), fixed-lag (with a delay, for live use), "
+        "gtsam-full and gtsam (the same by factor graphs in GTSAM), none; default: as the configuration says",
     )
 
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 from jeat_graph.config.fields import Section, choice, number
+from jeat_graph.data.errors import InputWarning
 
-ENGINES = ("fixed-lag", "fixed-lag-rts", "full", "rts", "none")
+ENGINES = ("fixed-lag", "full", "gtsam", "gtsam-full", "none")
+#: Names that engines had.
+FORMER = {"fixed-lag-rts": "fixed-lag", "rts": "full"}
+#: Engines whose rows are final while their track lives.
+LAGGED = ("fixed-lag", "gtsam")
 
 
 @dataclass(frozen=True)
@@ -15,10 +21,10 @@ class SmootherConfig(Section):
 
     engine: str = choice(
         "fixed-lag",
-        ENGINES,
+        (*ENGINES, *FORMER),
         "fixed-lag: rows are final at most twice `lag_s` later; full: once their track has ended; both by a "
-        "Rauch-Tung-Striebel pass, of the engine `paper` by a factor graph in GTSAM, and there fixed-lag-rts "
-        "and rts are the same by its own pass; none: no smoothing",
+        "Rauch-Tung-Striebel pass; gtsam and gtsam-full: the same numbers by a factor graph in GTSAM, with "
+        "that lag and of whole tracks; none: no smoothing; fixed-lag-rts and rts are fixed-lag and full",
     )
     lag_s: float = number(
         1.0, "s", "fixed lag: a state is final once this much time has followed", open_low=True
@@ -31,3 +37,10 @@ class SmootherConfig(Section):
         "later, by windows of that graph, which is what stream --road writes while it runs",
     )
     output_rate_hz: float = number(0.0, "Hz", "rows per second of the smoothed table; 0: one at each scan")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.engine in FORMER:
+            now = FORMER[self.engine]
+            warnings.warn(f"smoother.engine: {self.engine} is called {now} now", InputWarning, stacklevel=2)
+            object.__setattr__(self, "engine", now)

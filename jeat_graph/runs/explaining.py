@@ -170,7 +170,7 @@ def run_to_explain(folder: Path, moved: list[str] | None = None) -> tuple[Config
 
 def _steps(config: Config, detections: Detections) -> Iterator[_ReplayedStep]:
     tracker = Tracker(config)
-    if not hasattr(tracker, "hypotheses"):
+    if not tracker.can_explain:
         raise ConfigError(f"tracker.engine={config.tracker.engine} weighs no hypotheses: nothing to explain")
     for batch in detections.batches():
         tracker.step(batch)

@@ -19,12 +19,12 @@ from jeat_graph.io.files.state_file import read_state_file, write_state_file
 from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage
+from jeat_graph.tracking.engine import StepBoxes
 from jeat_graph.tracking.first_sight import wider
-from jeat_graph.tracking.model_measured import StepBoxes
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 32
+FORMAT = 34
 _MAGIC, _WHAT = "jeat-graph tracker", "saved tracker"
 
 

@@ -44,7 +44,7 @@ class Hypotheses(NamedTuple):
 
 def hypotheses_of(
     columns: Mapping[str, Any],
-    learnt: Mapping[str, Any],
+    belief: SensorBelief,
     constants: ModelConstants,
     t: float,
     shown: IntArray,
@@ -54,7 +54,7 @@ def hypotheses_of(
 
     Args:
         columns: of the living tracks, by name, as the model's `tracks` returns them.
-        learnt: what is believed of the sensors, as its `learnt` returns it.
+        belief: what is believed of the sensors.
         constants: of the model.
         t: time of the last step (s).
         shown: (R,) identities of the tracks that are reported.
@@ -68,7 +68,6 @@ def hypotheses_of(
             for f in fields(Evidence)
         }
     )
-    belief = SensorBelief(**{name: learnt[name] for name in SensorBelief._fields})
     track_id = np.asarray(columns["track_id"]).reshape(-1)
     mean = np.asarray(columns["mean"]).reshape(len(track_id), 2, singer.STATES)
     sides = box_sides.corners(mean)

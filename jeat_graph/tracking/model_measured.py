@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,28 +12,10 @@ from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.measurement import MEASUREMENT
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.tracking.by_track import places
+from jeat_graph.tracking.engine import StepBoxes
 
 #: No error of a sensor that lasts.
 _NO_ERROR = -1
-
-
-class StepBoxes(NamedTuple):
-    """The boxes of the last step, in the order of `ReferenceModel.takers`.
-
-    Attributes:
-        t: its time (s).
-        sensor: (M,) index of each box's sensor.
-        boxes: (M, 4) left, top, width, height (px).
-    """
-
-    t: float
-    sensor: IntArray
-    boxes: FloatArray
-
-    @staticmethod
-    def none() -> StepBoxes:
-        """Return what there is before the first step."""
-        return StepBoxes(0.0, np.zeros(0, dtype=np.int64), np.zeros((0, 4)))
 
 
 def diagnostics_of(
@@ -50,7 +31,7 @@ def diagnostics_of(
         told: the boxes.
         takers: (M,) tracks that took them.
         living: (N,) tracks after the step, ascending.
-        fit: of `ReferenceModel.fit`.
+        fit: of `Engine.fit`.
         sensors: names of the sensors.
     """
     nis, scale, real = fit
@@ -78,7 +59,7 @@ def records_of(
     Args:
         told: the boxes; sensors as the caller counts them.
         takers: (M,) tracks that took them.
-        fit: of `ReferenceModel.fit`.
+        fit: of `Engine.fit`.
         q: process noise of the scene.
         c: constants.
     """

@@ -9,22 +9,20 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage
+from jeat_graph.tracking.engine import Engine, Moment, StepBoxes
 from jeat_graph.tracking.input_watch import InputWatch
-from jeat_graph.tracking.model_measured import StepBoxes
-
-if TYPE_CHECKING:
-    from jeat_graph.tracking.reference_model import ReferenceModel
+from jeat_graph.tracking.smoothed_instants import SmoothedInstants
 
 
 class ModelSnapshot(NamedTuple):
     """All that the next step of a tracker depends on.
 
     Attributes:
-        moment: the model's.
+        moment: the engine's.
         sensors: names of those that had looked.
         classes: votes on the tracks' classes, or None.
         looks: what the tracks look like, or None.
@@ -32,7 +30,7 @@ class ModelSnapshot(NamedTuple):
         boxes: of the last step, for diagnostics.
     """
 
-    moment: Any
+    moment: Moment
     sensors: tuple[str, ...]
     classes: ClassTally | None
     looks: Looks | None
@@ -49,14 +47,15 @@ class SavedModel:
 
     if TYPE_CHECKING:
         config: Config
-        _model: ReferenceModel
+        _model: Engine
         _diagnostics: bool
         _finished: bool
         _watch: InputWatch
         _class_ids: dict[str, int]
         _called: list[str]
+        _instants: SmoothedInstants
 
-        def __init__(self, config: Config, *, diagnostics: bool = False, engine: str = "core") -> None:
+        def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
             """Make a tracker."""
 
         def snapshot(self) -> ModelSnapshot:
@@ -67,8 +66,8 @@ class SavedModel:
 
     @property
     def can_save(self) -> bool:
-        """Whether a run that was broken off can go on: the reference is not saved."""
-        return self.config.tracker.engine == "core"
+        """Whether a run that was broken off can go on."""
+        return self._model.can_save
 
     def save(self, path: str | Path) -> None:
         """Write the whole state to a file (`.npz`), smoothers included, for `load` to go on from.
@@ -76,7 +75,7 @@ class SavedModel:
         This tracker and the loaded one give the same bytes from here on.
 
         Raises:
-            JeatGraphError: the engine is the reference.
+            JeatGraphError: the engine is not saved.
         """
         from jeat_graph.tracking.checkpoint import save_state
 
@@ -95,16 +94,13 @@ class SavedModel:
         """Return what `from_state` takes: the state now, or at a snapshot, with the smoother's of now.
 
         Raises:
-            JeatGraphError: the engine is the reference.
+            JeatGraphError: the engine is not saved.
         """
-        if not self.can_save:
-            raise JeatGraphError(f"engine {self.config.tracker.engine} is not saved; tracker.engine=core is")
         now = self.snapshot() if snapshot is None else snapshot
-        model: Any = self._model
         return {
             "diagnostics": self._diagnostics,
             "finished": self._finished,
-            "model": model.state(now.moment),
+            "model": dict(self._model.state(now.moment)),
             "sensors": list(now.sensors),
             "classes": now.classes,
             "looks": now.looks,
@@ -112,6 +108,7 @@ class SavedModel:
             "boxes": now.boxes,
             "class_ids": self._class_ids,
             "called": self._called,
+            "instants": self._instants.state(),
         }
 
     @classmethod
@@ -121,14 +118,14 @@ class SavedModel:
         Raises:
             DataError: no tracker can be in that state.
         """
-        tracker = cls(config, diagnostics=bool(state["diagnostics"]), engine=config.tracker.engine)
-        model: Any = tracker._model
+        tracker = cls(config, diagnostics=bool(state["diagnostics"]))
+        model = tracker._model
         try:
             model.set_state(state["model"])
         except ValueError as error:
             raise DataError(f"is damaged: {error}") from None
         sensors, called = tuple(state["sensors"]), list(state["called"])
-        if len(set(sensors)) != model.sensors() or not set(sensors) <= set(config.sensors):
+        if len(set(sensors)) != len(model.last_looks()) or not set(sensors) <= set(config.sensors):
             raise DataError("is damaged: its sensors are not those of its state")
         if not all(isinstance(name, str) for name in called):
             raise DataError("is damaged: names of classes are none")
@@ -142,6 +139,7 @@ class SavedModel:
         tracker._finished, tracker._called = bool(state["finished"]), called
         tracker._class_ids = {str(name): int(number) for name, number in state["class_ids"].items()}
         _check_labels(state["model"], len(called))
+        tracker._instants.set_state(state["instants"])
         if model.time() is not None:
             tracker._watch.end()
         return tracker

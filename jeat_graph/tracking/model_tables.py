@@ -10,28 +10,12 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import box_sides, singer
+from jeat_graph.smoothers.rows import ModelRows
 from jeat_graph.tracking.classes import ClassTally
-from jeat_graph.tracking.reference_model import ModelRows
 
 #: Sensors of which all combinations are listed beforehand.
 _MOST_LISTED = 8
 _MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
-
-
-def in_order(rows: ModelRows) -> ModelRows:
-    """Return rows in order of time, then of identity."""
-    order = np.lexsort((rows[1], rows[0]))
-    t, ids, mean, variance, real, used, label, share = rows
-    return (
-        t[order],
-        ids[order],
-        mean[order],
-        variance[order],
-        real[order],
-        used[order],
-        label[order],
-        share[order],
-    )
 
 
 class ClassNames(NamedTuple):

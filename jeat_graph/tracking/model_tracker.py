@@ -1,7 +1,4 @@
-"""One model of what a sensor says as a tracker: `Tracker(engine="core")` in C++, `"reference"` in NumPy.
-
-Both compute the same: the reference is the definition, the core is fast.
-"""
+"""The tracker over an engine (`engine.Engine`): checks what comes, steps, and makes tables of the rows."""
 
 from __future__ import annotations
 
@@ -9,35 +6,37 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config
-from jeat_graph.core import tracking as core
+from jeat_graph.config.tracker import Engine as EngineName
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, RecordArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.filters import singer
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.filters.score_calibration import logit
 from jeat_graph.rig.common_picture import CommonPicture
+from jeat_graph.smoothers.histories import StepRecord
+from jeat_graph.smoothers.rows import ModelRows, in_order
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names, number_classes
+from jeat_graph.tracking.engine import Engine, Looked, Recorded, StepBoxes
+from jeat_graph.tracking.engines import make_engine
 from jeat_graph.tracking.first_sight import wider
-from jeat_graph.tracking.hypotheses import Hypotheses, hypotheses_of
+from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.input_watch import InputWatch
-from jeat_graph.tracking.model_measured import StepBoxes, diagnostics_of, records_of
+from jeat_graph.tracking.model_measured import diagnostics_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
-from jeat_graph.tracking.model_tables import ClassNames, Places, in_order, table_of, with_classes
-from jeat_graph.tracking.prediction import Prediction, of_motion, predicted, still_there, time_from
-from jeat_graph.tracking.reference_model import ModelRows, ReferenceModel
+from jeat_graph.tracking.model_tables import ClassNames, Places, table_of, with_classes
+from jeat_graph.tracking.prediction import Prediction, of_motion, still_there, time_from
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
+from jeat_graph.tracking.smoothed_instants import SmoothedInstants
 from jeat_graph.tracking.updates import Updates
 
 #: Most sensors: the columns of `Trajectories.used` are the bits of a signed number.
@@ -52,14 +51,16 @@ class PendingStep(NamedTuple):
     """A step that the smoothers are to be told of when nothing can come before it any more.
 
     Attributes:
-        record: the model's, of N tracks.
+        record: the engine's, of N tracks.
+        t: its time (s).
         ids: (N,) their identities.
         label: (N,) numbers of their classes, or None.
         share: (N,) of the votes that speak for these, or None.
         given: (N,) identities that the tables are to have in their place, or None.
     """
 
-    record: Any
+    record: Recorded
+    t: float
     ids: IntArray
     label: IntArray | None = None
     share: FloatArray | None = None
@@ -73,20 +74,22 @@ def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
 
 
 class ModelTracker(Updates, SavedModel):
-    """The model as a tracker.
+    """An engine as a tracker.
 
     Sensors have any names and are known from their first scan on. Boxes are reported up to the edge of the
-    picture where `output.clip` says so and the detectors' end there, else as they are. Of the configuration
-    it takes the size of the picture, if that was given, the smoother (with a fixed lag rows are final after
-    twice `smoother.lag_s`, else when their track has ended), and of a sensor its own picture and at which
-    score its boxes are as likely real as not.
+    picture where `output.clip` says so and the detectors' end there, else as they are. With a fixed lag
+    rows are final after twice `smoother.lag_s`, else when their track has ended.
 
     Args:
         config: a configuration, the name of a preset, or of a YAML file.
         image: width and height of the picture (px), also as "1920x1080".
         diagnostics: take down how well each detection fitted its track, for `last_updates`.
-        engine: "core" or "reference", which smooths whole tracks only.
-        constants: of the model.
+        engine: if not that of the configuration.
+        constants: of the model, if not the usual ones; not for the engine `paper`.
+
+    Raises:
+        ConfigError: no such engine, or constants for one that has none.
+        JeatGraphError: diagnostics of an engine that has none.
     """
 
     #: Whether a sensor that is met late changes nothing of what was before.
@@ -98,25 +101,23 @@ class ModelTracker(Updates, SavedModel):
         *,
         image: tuple[float, float] | str | None = None,
         diagnostics: bool = False,
-        engine: str = "core",
+        engine: EngineName | None = None,
         constants: ModelConstants | None = None,
     ) -> None:
         config = as_config(config, image)
-        if config.tracker.engine != engine:
+        if engine is not None and config.tracker.engine != engine:
             config = replace(config, tracker=replace(config.tracker, engine=engine))
         self.config = config
         self.constants = constants or ModelConstants()
         self.sensor_names: tuple[str, ...] = config.sensor_names
-        self._looked: tuple[str, ...] = ()  # names of the sensors as the model counts them
+        self._looked: tuple[str, ...] = ()  # names of the sensors as the engine counts them
         self._places = Places(())  # where these stand among all
         self.logs_takers = True
         self._diagnostics = diagnostics
         self._smooths = config.smoother.engine != "none"
-        # The core's has the methods of the reference.
-        make = cast(type[ReferenceModel], core.Model) if engine == "core" else ReferenceModel
-        known = config.input.picture == "given"
-        size = (float(config.image.width), float(config.image.height)) if known else (1.0, 1.0)
-        self._model = make(self.constants, *size, known, self._lag_s())
+        self._model: Engine = make_engine(config, constants)
+        if diagnostics and not self._model.has_fit:
+            raise JeatGraphError(f"engine {self._model.name} has no diagnostics")
         self._common = CommonPicture.of(config)
         self._watch = InputWatch(config)
         self._classes: ClassTally | None = None
@@ -126,6 +127,7 @@ class ModelTracker(Updates, SavedModel):
         self._causal: Trajectories | None = None
         self._order: IntArray = _NO_BOXES
         self._boxes = StepBoxes.none()
+        self._instants = SmoothedInstants(config)
         self._finished = False
 
     @property
@@ -144,14 +146,19 @@ class ModelTracker(Updates, SavedModel):
         return self._diagnostics
 
     @property
+    def can_explain(self) -> bool:
+        """Whether `hypotheses` has something to say."""
+        return self._model.weighs
+
+    @property
     def time(self) -> float | None:
         """Time of the last step (s), or None before the first."""
         return self._model.time()
 
     @property
     def smoother_counts(self) -> dict[str, int]:
-        """What the smoothers count: nothing here."""
-        return {}
+        """What the smoothers count, by name."""
+        return self._model.smoother_counts()
 
     def step(self, scans: ScanLike | Sequence[ScanLike]) -> Trajectories:
         """Take in one scan, or several of one and the same time.
@@ -177,6 +184,7 @@ class ModelTracker(Updates, SavedModel):
             batch = [self._common.boxes(scan) for scan in batch]
         self._take_in(batch)
         if self._smooths:
+            self._instants.note(float(batch[0].t))
             self._model.hand_over(None, None, *self._called_now())
         return self.causal()
 
@@ -197,7 +205,8 @@ class ModelTracker(Updates, SavedModel):
         self._take_in(batch)
         if not self._smooths:
             return None
-        return PendingStep(self._model.record(), self._model.living(), *self._called_now())
+        ids, t = self._model.living(), float(batch[0].t)
+        return PendingStep(self._model.record(), t, ids, *self._called_now())
 
     def _take_in(self, batch: Sequence[Scan]) -> None:
         if self._finished:
@@ -207,6 +216,8 @@ class ModelTracker(Updates, SavedModel):
             raise TimeOrderError(f"scan at t = {t} s is older than the last one at {now} s")
         check_names(self._classes, batch)
         seen = any(scan.embeddings is not None for scan in batch)
+        if seen and not self._model.compares_looks:
+            raise DataError("this engine compares no embeddings; leave them or the engine away")
         embeddings = embeddings_of(self._looks, batch) if seen else None
         self._watch.look(batch)  # before anything changes: a user may have made warnings errors
         self._declare(batch)
@@ -218,10 +229,9 @@ class ModelTracker(Updates, SavedModel):
         boxes = np.concatenate([scan.boxes for scan in batch])[order]
         scores = np.concatenate([scan.scores for scan in batch])[order]
         numbers = np.bincount(sensor, minlength=len(self._looked))[looking].astype(np.int64)
-        sides = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1)
         compared = None if embeddings is None else self._compare(embeddings, sensor)
-        alike = None if compared is None else np.ascontiguousarray(compared.log_ratio[:, order])
-        self._model.take(t, looking, numbers, sides, logit(scores), alike, _surest_motion(batch))
+        alike = None if compared is None else compared.log_ratio[:, order]
+        self._model.take(Looked(t, looking, numbers, boxes, scores, alike, _surest_motion(batch)))
         self._order, self._causal = order, None
         if self._diagnostics:
             self._boxes = StepBoxes(t, sensor[order], boxes)
@@ -233,6 +243,7 @@ class ModelTracker(Updates, SavedModel):
     def hand_over(self, taken: PendingStep | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
         if taken is not None:
+            self._instants.note(taken.t)
             self._model.hand_over(taken.record, taken.given, taken.label, taken.share)
 
     def snapshot(self) -> ModelSnapshot:
@@ -257,6 +268,7 @@ class ModelTracker(Updates, SavedModel):
             self._model.begin_anew(t)
             # The model has no last step now, so there are no boxes of one either.
             self._order, self._boxes, self._causal = _NO_BOXES, StepBoxes.none(), None
+            self._instants.begin_anew()
 
     def number_on_from(self, identity: int) -> None:
         """Give no track that begins from now on an identity below this."""
@@ -320,12 +332,11 @@ class ModelTracker(Updates, SavedModel):
             TimeOrderError: a time before that of the last step.
         """
         t = time_from(t, self.time)
-        rows = with_classes(self._model.rows(), self._classes, self._called)
-        learnt = self._model.learnt()
-        noise = singer.ProcessNoise(*learnt["process_noise"]), float(learnt["log_scene_variance"])
-        rows, covariance = predicted(rows, self._model.states(), t, noise, self.constants)
+        rows, covariance = self._model.predicted(t)
+        rows, picture = with_classes(rows, self._classes, self._called), self._model.picture()
         table = self._table(rows)
-        table = table.take(np.isin(table.track_id, rows[1][still_there(rows, self._model.picture())]))
+        if picture is not None:
+            table = table.take(np.isin(table.track_id, rows[1][still_there(rows, picture)]))
         return Prediction(**vars(table), cov=of_motion(covariance[np.isin(rows[1], table.track_id)]))
 
     def last_updates(self) -> Diagnostics:
@@ -350,9 +361,8 @@ class ModelTracker(Updates, SavedModel):
         """
         self._check_diagnostics()
         told = self._boxes._replace(sensor=self._places.at[self._boxes.sensor])
-        q, fit = singer.ProcessNoise(*self._model.learnt()["process_noise"]), self._model.fit()
-        rows = records_of(told, self._model.takers(), fit, q, self.constants)
-        return rows, self._model.living(), fit[2] > self.constants.report
+        real = self._model.fit()[2]
+        return self._model.measurements(told), self._model.living(), real > self.constants.report
 
     def run(self, detections: Detections) -> Iterator[Trajectories]:
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""
@@ -378,7 +388,8 @@ class ModelTracker(Updates, SavedModel):
         return self._smoothed_table(self._model.drain())
 
     def settle(self) -> None:
-        """Do nothing: no smoother works behind."""
+        """Have the smoother be as one that was saved and loaded."""
+        self._model.settle()
 
     def finish(self) -> Trajectories:
         """End all tracks and return their smoothed trajectories; empty when called again."""
@@ -389,35 +400,33 @@ class ModelTracker(Updates, SavedModel):
         return rows
 
     def hypotheses(self) -> Hypotheses:
-        """Return what the living tracks are taken for, and why (`jeat-graph explain`)."""
-        learnt, columns = self._model.learnt(), self._model.tracks()
+        """Return what the living tracks are taken for, and why (`jeat-graph explain`).
+
+        Raises:
+            JeatGraphError: the engine weighs none.
+        """
         t = 0.0 if self.time is None else self.time
-        return hypotheses_of(columns, learnt, self.constants, t, self.causal().track_id, self._looked)
+        return self._model.hypotheses(t, self.causal().track_id, self._looked)
+
+    def learnt(self) -> dict[str, SensorState]:
+        """Return what has been learnt of each sensor that has looked, by name; as `sensor_states`."""
+        return self.sensor_states()
 
     def sensor_states(self) -> dict[str, SensorState]:
         """Return what has been learnt of each sensor that has looked, by name."""
-        learnt = self._model.learnt()
-        noise = np.exp(learnt["log_side_variance"]) / self.constants.side_std**2
-        believed = 1.0 / (1.0 + np.exp(-learnt["prior_odds"]))
-        offsets = learnt["offsets"].tolist()
-        return {
-            name: SensorState(
-                clutter=float(learnt["false_boxes"][k]),
-                p_detect=float(learnt["p_detect"][k]),
-                precision=float(believed[k]),
-                unseen=float(learnt["unseen"][k]),
-                stationary_unseen=float(learnt["stationary_unseen"][k]),
-                noise_scale=float(noise[k]),
-                offset_centre_share=(offsets[k][0], offsets[k][1]),
-                offset_log_size=(offsets[k][2], offsets[k][3]),
-            )
-            for k, name in enumerate(self._looked)
-        }
+        return dict(zip(self._looked, self._model.sensor_states(), strict=True))
 
-    def _lag_s(self) -> float:
-        if not self._smooths:
-            return -1.0
-        return self.config.smoother.lag_s if self.config.smoother.engine.startswith("fixed-lag") else math.inf
+    def step_record(self, taken: PendingStep) -> StepRecord:
+        """Return how the filter went through a step that `take_in` returned, as every engine has it.
+
+        Sensors are counted as they have looked (`looked`).
+        """
+        return self._model.step_record(taken.record)
+
+    @property
+    def looked(self) -> tuple[str, ...]:
+        """Names of the sensors that have looked, in the order in which the engine counts them."""
+        return self._looked
 
     def _check_smooths(self) -> None:
         if not self._smooths:
@@ -433,9 +442,7 @@ class ModelTracker(Updates, SavedModel):
         if len(self._looked) + len(new) > _MOST_SENSORS:
             raise DataError(f"at most {_MOST_SENSORS} sensors can be tracked together")
         for name in new:
-            said = self.config.sensors[name]
-            even = math.nan if said.even_score is None else float(logit(np.array(said.even_score)))
-            self._model.declare_sensor(even)
+            self._model.declare_sensor(name, self.config.sensors[name])
             self._looked = (*self._looked, name)
         if new:
             self._find_places()
@@ -467,7 +474,7 @@ class ModelTracker(Updates, SavedModel):
 
     def _smoothed_table(self, rows: ModelRows) -> Trajectories:
         """Return rows of the smoother in order of time, then of identity."""
-        return self._table(in_order(rows))
+        return self._instants.of(self._table(in_order(rows)))
 
     def _table(self, rows: ModelRows, instants: FloatArray | None = None) -> Trajectories:
         """Return rows as a table, whose sensors are those of the configuration."""

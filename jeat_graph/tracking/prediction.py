@@ -13,7 +13,7 @@ from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.tracking.reference_model import ModelRows
+from jeat_graph.smoothers.rows import ModelRows
 
 _MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
 

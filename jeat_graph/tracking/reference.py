@@ -32,6 +32,7 @@ from jeat_graph.filters import (
     visibility,
 )
 from jeat_graph.filters.evidence import ScanClock
+from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.picture_motion import PictureMotion
 from jeat_graph.filters.visibility import VISIBLE
@@ -89,6 +90,7 @@ class Reported(NamedTuple):
         records: per scan, for the smoother.
         nis: per scan (M,) of `AssociatedPairs`, NaN where a box began a track.
         noise_scale: per scan, variance of the sensor's sides as it was, 1 before anything was learnt.
+        gaps: counted before any track ends.
     """
 
     tracks: ReferenceTracks
@@ -97,6 +99,7 @@ class Reported(NamedTuple):
     records: list[FilterRecord]
     nis: list[FloatArray]
     noise_scale: list[float]
+    gaps: GapCounts
 
 
 def step(
@@ -138,13 +141,15 @@ def step(
         begin_tracks(state, scan, free, clock, c)
         takers[place] = taker_of(state, pairs, free)
         compare_sensors(state, given, takers[place], c)
-        records.append(record(before, state.tracks, transition))
+        took = np.where(np.isin(state.tracks.track_id, takers[place]), given.sensor, -1)
+        records.append(record(before, state.tracks, transition, took))
     compare_overlaps(state)
     judge(state, c)
     for given, taker in zip(scans, takers, strict=True):
         count_false_boxes(state, given.sensor, taker, c)
     learn(state, t, c)
-    out = Reported(state.tracks, report(state, c), takers, records, nis, noise_scale)
+    shown = report(state, c)
+    out = Reported(state.tracks, shown, takers, records, nis, noise_scale, state.gaps)
     end_tracks(state, t, c)
     return out
 
@@ -404,11 +409,11 @@ def taker_of(state: ReferenceState, pairs: AssociatedPairs, free: IntArray) -> I
     return out
 
 
-def record(before: ReferenceTracks, after: ReferenceTracks, F: FloatArray) -> FilterRecord:
+def record(before: ReferenceTracks, after: ReferenceTracks, F: FloatArray, sensor: IntArray) -> FilterRecord:
     """Return what the smoother needs of an update; of a track that begins, no prediction is ever asked."""
     n = len(before)
     born = np.broadcast_to(np.eye(singer.STATES), (len(after) - n, 1, singer.STATES, singer.STATES))
     F = np.concatenate([F, born])
     mean = np.concatenate([before.mean, after.mean[n:]])
     covariance = np.concatenate([before.covariance, after.covariance[n:]])
-    return FilterRecord(after.track_id, F, mean, covariance, after.mean, after.covariance)
+    return FilterRecord(after.track_id, F, mean, covariance, after.mean, after.covariance, sensor)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Self, cast
 
-from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config, Preset
-from jeat_graph.config.tracker import ENGINES, Engine
-from jeat_graph.data.errors import ConfigError
+from jeat_graph.config.tracker import Engine
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.tracking.model_tracker import ModelTracker
 
@@ -36,28 +33,6 @@ class Tracker(ModelTracker):
         1
     """
 
-    def __new__(
-        cls,
-        config: Config | Preset | str | Path = "default",
-        *,
-        engine: Engine | None = None,
-        **settings: Any,
-    ) -> Self:
-        """Return a tracker of an engine.
-
-        Raises:
-            ConfigError: no such engine.
-        """
-        name = as_config(config).tracker.engine if engine is None else engine
-        if name not in ENGINES:
-            raise ConfigError(f"engine is one of {', '.join(ENGINES)}, not {name!r}")
-        if name == "paper":
-            from jeat_graph.tracking.paper.tracker import PaperTracker
-
-            # It has the methods of a tracker, or says that it lacks one: for callers' types it is one.
-            return cast(Self, PaperTracker(config, **settings))
-        return super().__new__(cls)
-
     def __init__(
         self,
         config: Config | Preset | str | Path = "default",
@@ -67,6 +42,4 @@ class Tracker(ModelTracker):
         engine: Engine | None = None,
         constants: ModelConstants | None = None,
     ) -> None:
-        config = as_config(config)
-        name = config.tracker.engine if engine is None else engine
-        super().__init__(config, image=image, diagnostics=diagnostics, engine=name, constants=constants)
+        super().__init__(config, image=image, diagnostics=diagnostics, engine=engine, constants=constants)

@@ -20,7 +20,7 @@ def both_tables(config: Config, detections: Detections) -> tuple[Trajectories, T
         config: sensors and settings.
         detections: the recording.
     """
-    tracker = Tracker(replace(config, smoother=replace(config.smoother, engine="rts")))
+    tracker = Tracker(replace(config, smoother=replace(config.smoother, engine="full")))
     causal = list(tracker.run(detections))
     smoothed = tracker.finish()
     return Trajectories.concatenate(causal or [Trajectories.empty(tracker.sensor_names)]), smoothed

@@ -22,20 +22,15 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.smoothers.filtered_track import FilteredTrack
+from jeat_graph.smoothers.gtsam.track_factors import Reference, TrackFactors, track_factors
 
 __all__ = ["FilterGraph", "filter_graph"]
 
 STATE = "x"
 #: The states of one track have numbers from `MOST_STATES` · track on.
 MOST_STATES = 1_000_000
-# Records closer together in time than this are one state (s).
-_SAME_TIME_S = 1e-6
-# Of a measurement's information, in units of what was known before, less than this is rounding.
-_LEAST_TOLD = 1e-9
-# Process noise that is smaller than this, in units of the prediction's variances, is rounding.
-_LEAST_NOISE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +97,9 @@ def filter_graph(tracks: Sequence[FilteredTrack]) -> FilterGraph:
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     times = {}
     for track in tracks:
-        states = _state_of_record(track)
-        _add(graph, values, track, states)
-        times[track.track_id] = track.t[np.flatnonzero(np.diff(states, prepend=-1))]
+        made = track_factors(track)
+        _add(graph, values, track, made)
+        times[track.track_id] = track.t[np.flatnonzero(np.diff(made.state, prepend=-1))]
     by_number = {track.track_id: track for track in tracks}
     return FilterGraph(graph, values, times, tracks[0].mean.shape[2], by_number)
 
@@ -115,76 +110,43 @@ def _key(track: int, state: int) -> int:
     return int(gtsam.symbol(STATE, MOST_STATES * track + state))
 
 
-def _state_of_record(track: FilteredTrack) -> IntArray:
-    """Return the number of the state (K,) of each record: one that nothing parts from the last shares it."""
-    later = np.diff(track.t, prepend=track.t[0]) > _SAME_TIME_S
-    later[1:] |= (track.predicted_mean[1:] != track.mean[:-1]).any(axis=(1, 2))
-    later[:1] = False
-    return np.cumsum(later)
-
-
-def _add(graph: Any, values: Any, track: FilteredTrack, states: IntArray) -> None:
+def _add(graph: Any, values: Any, track: FilteredTrack, made: TrackFactors) -> None:
+    """Add a track's rows, which are on ξ = L⁻¹ (x − m), as rows on its states x: A L⁻¹ x = b + A L⁻¹ m."""
     import gtsam
 
-    linear = gtsam.GaussianFactorGraph()
-    zeros = gtsam.Values()
-    for k, state in enumerate(states.tolist()):
+    linear, zeros = gtsam.GaussianFactorGraph(), gtsam.Values()
+    mean, inverse = made.reference.mean, np.asarray(np.linalg.inv(made.reference.root), dtype=np.float64)
+    for state, m in enumerate(mean):
         key = _key(track.track_id, state)
-        begins = k == 0 or states[k - 1] != state
-        if k == 0:
-            A, b = _rows_of(track.mean[0], np.linalg.inv(track.covariance[0]))
-            linear.add(key, A, b, _unit(len(b)))
-        elif begins:
-            _add_motion(linear, track, k, _key(track.track_id, state - 1), key)
-        if k and track.sensor[k] >= 0:
-            A, b = _measured(track, k)
-            if len(b):
-                linear.add(key, A, b, _unit(len(b)))
-        if begins:
-            zeros.insert(key, np.zeros(track.mean[k].size))
-        elif values.exists(key):
-            values.erase(key)
-        values.insert(key, track.mean[k].ravel())
+        zeros.insert(key, np.zeros(m.size))
+        values.insert(key, m.ravel())
+    linear.add(_key(track.track_id, 0), *_rows_of(mean[0], inverse[0]), _unit(mean[0].size))
+    for one in made.rows:
+        here = int(made.state[one.record])
+        A, shift = _on_state(one.A, here, one.axis, made.reference, inverse)
+        key, right = _key(track.track_id, here), one.b + shift
+        if one.before is None:
+            linear.add(key, A, right, _unit(len(right)))
+        else:
+            before, shift = _on_state(one.before, here - 1, one.axis, made.reference, inverse)
+            linear.add(key - 1, before, key, A, right + shift, _unit(len(right)))
     # Without the point of linearisation the result is silently wrong.
     graph.push_back(gtsam.LinearContainerFactor.ConvertLinearGraph(linear, zeros))
 
 
-def _add_motion(linear: Any, track: FilteredTrack, k: int, before: int, key: int) -> None:
-    """Add x = F x⁻ + c + w, w of covariance P⁻ − F P Fᵀ, whitened."""
-    F = track.F[k]
-    noise = track.predicted_covariance[k] - F @ track.covariance[k - 1] @ np.swapaxes(F, -1, -2)
-    shift = track.predicted_mean[k] - (F @ track.mean[k - 1][..., None])[..., 0]
-    scale = np.sqrt(np.diagonal(track.predicted_covariance[k], axis1=-2, axis2=-1))
-    scaled = noise / (scale[..., :, None] * scale[..., None, :])
-    root = np.linalg.cholesky(scaled + _LEAST_NOISE * np.eye(scaled.shape[-1]))
-    W = np.linalg.inv(root) / scale[..., None, :]
-    b = (W @ shift[..., None])[..., 0].ravel()
-    linear.add(before, _block(-W @ F), key, _block(W), b, _unit(len(b)))
+def _on_state(
+    A: FloatArray, state: int, axis: int, reference: Reference, inverse: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return rows A ξ of one axis as rows on a state of both, and what they add to b."""
+    size, on_axis = A.shape[1], A @ inverse[state, axis]
+    wide = np.zeros((len(A), reference.mean[state].size))
+    wide[:, axis * size : (axis + 1) * size] = on_axis
+    return wide, on_axis @ reference.mean[state, axis]
 
 
-def _measured(track: FilteredTrack, k: int) -> tuple[FloatArray, FloatArray]:
-    """Return rows A x = b of unit noise that turn the state before an update into the one after it."""
-    before, after = np.linalg.inv(track.predicted_covariance[k]), np.linalg.inv(track.covariance[k])
-    told = (after @ track.mean[k][..., None] - before @ track.predicted_mean[k][..., None])[..., 0]
-    # In units of what was known before: rounding is told apart from what was measured there.
-    root = np.linalg.cholesky(track.predicted_covariance[k])
-    inside = np.swapaxes(root, -1, -2) @ (after - before) @ root
-    rows, right = [], []
-    for axis in range(len(told)):
-        size, vectors = np.linalg.eigh(inside[axis])
-        for s, v in zip(size, vectors.T, strict=True):
-            if s > _LEAST_TOLD:
-                row = np.zeros(track.mean[k].shape)
-                row[axis] = np.linalg.solve(root[axis].T, v) * np.sqrt(s)
-                rows.append(row.ravel())
-                right.append(v @ root[axis].T @ told[axis] / np.sqrt(s))
-    return np.array(rows).reshape(len(rows), track.mean[k].size), np.array(right)
-
-
-def _rows_of(mean: FloatArray, information: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return rows A x = b of unit noise of a state with mean (A, D) and information (A, D, D)."""
-    W = np.swapaxes(np.linalg.cholesky(information), -1, -2)
-    return _block(W), (W @ mean[..., None])[..., 0].ravel()
+def _rows_of(mean: FloatArray, inverse: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return rows A x = b of unit noise of a state with mean (A, D) and covariance L Lᵀ, of L⁻¹ (A, D, D)."""
+    return _block(inverse), (inverse @ mean[..., None])[..., 0].ravel()
 
 
 def _block(blocks: FloatArray) -> FloatArray:

@@ -35,7 +35,7 @@ def run(tmp_path_factory):
     (folder / "det.csv").write_text("\n".join(lines) + "\n")
     (folder / "gt.csv").write_text("\n".join(truth) + "\n")
     out = folder / "run"
-    formats = ("--format", "parquet", "kitti", "motchallenge", "--smoother", "rts")
+    formats = ("--format", "parquet", "kitti", "motchallenge", "--smoother", "full")
     assert main(["track", str(folder / "det.csv"), "--out", str(out), *formats]) == 0
     return folder
 

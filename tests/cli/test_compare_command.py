@@ -19,7 +19,7 @@ def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("compare")
     assert main(["simulate", "day-sparse", "--out", str(path / "sim"), "--duration", "2", "--seed", "1"]) == 0
     detections = str(path / "sim" / "detections.csv")
-    assert main(["track", detections, "--out", str(path / "run"), "--smoother", "rts"]) == 0
+    assert main(["track", detections, "--out", str(path / "run"), "--smoother", "full"]) == 0
     return path
 
 

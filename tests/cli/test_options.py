@@ -73,12 +73,12 @@ def test_the_size_of_the_picture_is_one_option(command):
 
 
 def test_the_size_of_the_picture_is_a_setting_like_any_other():
-    args = parse("track", "--set", "image.width=7", "--image", "1920x1080", "--smoother", "rts")
+    args = parse("track", "--set", "image.width=7", "--image", "1920x1080", "--smoother", "full")
     assert overrides(args) == [
         "image.width=7",
         "image.width=1920",
         "image.height=1080",
-        "smoother.engine=rts",
+        "smoother.engine=full",
     ]
 
 

@@ -50,7 +50,7 @@ def test_formats_that_count_frames_say_how_long_the_run_lasts(run, capsys):
     assert "20 Hz" in error
 
 
-@pytest.mark.parametrize("engine", ["full", "rts"])
+@pytest.mark.parametrize("engine", ["full", "gtsam-full"])
 def test_engines_over_whole_tracks_have_a_row_at_each_scan_and_none_between(tmp_path, engine):
     """However long nothing comes: a track ends there, and is not carried on to the wrong time."""
     path = detections(tmp_path, 1e18)

@@ -22,7 +22,7 @@ LENGTH = 1500 if FULL else 120
 SENSORS = ("evt", "rgb")
 DECLARED = ("sensors.evt={}", "sensors.rgb={}", "input.undeclared=refuse")
 #: The smoothers of each preset that need no other package.
-SMOOTHERS = {"default": ("fixed-lag", "rts"), "paper": ("fixed-lag-rts", "rts")}
+SMOOTHERS = {"default": ("fixed-lag", "full", "gtsam"), "paper": ("fixed-lag", "full", "gtsam-full")}
 DOCUMENTED = (DataError, TimeOrderError, UnknownSensorError)
 #: Part by which a smoothed variance may exceed the causal one: what may have moved a vehicle goes by the size
 #: of its box, of which the smoother may think otherwise; boxes that grow fivefold show it.

@@ -21,7 +21,7 @@ from jeat_graph_sehn.simulation.simulate import record
 COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used")
 PICTURE = ["image.width=1280", "image.height=720", "input.picture=given"]
 OVERRIDES = [*PICTURE, "smoother.lag_s=0.3"]
-ENGINES = ("fixed-lag", "rts", "none")
+ENGINES = ("fixed-lag", "full", "gtsam", "none")
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from jeat_graph.live.late import LiveTracker
 
 _PICTURE = ["image.width=1280", "image.height=720", "input.picture=given"]
 CONFIG = load_config("default", [*_PICTURE, "smoother.lag_s=.4", "live.late_s=.3"])
-WHOLE = load_config("default", [*_PICTURE, "smoother.engine=rts", "live.late_s=.3"])
+WHOLE = load_config("default", [*_PICTURE, "smoother.engine=full", "live.late_s=.3"])
 PAPER = load_config("paper", [*_PICTURE, "smoother.lag_s=.4", "live.late_s=.3"])
 
 
@@ -120,7 +120,7 @@ def test_a_stream_goes_on_from_a_checkpoint_with_the_same_bytes(config, policy, 
     "settings",
     [
         ["--config", "paper"],
-        ["--set", "tracker.engine=reference", "--set", "smoother.engine=rts"],
+        ["--set", "tracker.engine=reference", "--set", "smoother.engine=full"],
     ],
 )
 def test_a_checkpoint_of_an_engine_that_is_not_saved_is_refused_before_anything(settings, tmp_path, capsys):
@@ -198,7 +198,7 @@ def test_a_stream_of_sensors_that_nobody_declared_ends_with_a_record(preset, tmp
     assert "cam" in run["learnt"]
 
 
-@pytest.mark.parametrize("engine", ["fixed-lag", "rts"])
+@pytest.mark.parametrize("engine", ["fixed-lag", "full"])
 def test_scans_of_one_time_that_come_one_by_one_are_one_smoothed_row(engine):
     live = LiveTracker(Tracker(load_config("default", [*_PICTURE, f"smoother.engine={engine}"])), "skip")
     parts = []

@@ -12,10 +12,11 @@ import numpy as np
 
 from benchmarks.speed_worker import resident_mib
 from jeat_graph import Tracker, load_config
-from jeat_graph.smoothers.fixed_lag import FixedLagChain
+from jeat_graph.smoothers.filtered_track import FilteredTrack
+from jeat_graph.smoothers.gtsam.solvers import LagChain
 
 #: The tracker whose smoother is GTSAM's with a fixed lag.
-LAGGED = load_config("paper", ["smoother.engine=fixed-lag"])
+LAGGED = load_config("paper", ["smoother.engine=gtsam"])
 
 
 def traffic(num):
@@ -104,20 +105,24 @@ def short_tracks():
             tracker.drain_smoothed()
             gc.collect()
             memory.append(resident_mib())
-    left = len(tracker._smoothers._paths)
+    left = len(tracker._model._histories._solver._chains)
     return {"memory": memory, "left": left, **tracker.smoother_counts}
 
 
 def short_windows():
     """Memory (MiB) while windows of a few states are filled and forgotten, one reading per 50 lives."""
-    rng, memory = np.random.default_rng(0), []
+    rng, memory, F = np.random.default_rng(0), [], np.broadcast_to(np.eye(3), (7, 2, 3, 3))
+    wide, narrow = (
+        np.broadcast_to(part * np.diag([9.0, 2500.0, 900.0]), (7, 2, 3, 3)) for part in (2.0, 1.0)
+    )
     for life in range(250):
-        chain = FixedLagChain(np.zeros((2, 3)), np.diag([9.0, 2500.0, 900.0]))
+        chain, mean = LagChain(), rng.normal(size=(7, 2, 3))
+        whole = FilteredTrack(life, np.arange(7.0), F, mean, wide, mean, narrow, np.zeros(7, dtype=np.int64))
         for number in range(6):
-            factor = np.concatenate([np.eye(6), rng.normal(size=(6, 2))], axis=1)
-            factor[:3, 3:6] = -np.eye(3)
-            chain.append([factor], [np.zeros((2, 3))])
-            chain.means(range(number, number + 2))
+            here = slice(number, number + 2)
+            states = (one[here] for one in (whole.t, F, mean, wide, mean, narrow, whole.sensor))
+            chain.extend(FilteredTrack(life, *states))
+            chain.states(1)
             chain.leave(1)
         if life % 50 == 49:
             gc.collect()

@@ -66,7 +66,7 @@ def record_of(out):
     return {key: value for key, value in record.items() if key != "timings"}
 
 
-@pytest.mark.parametrize("engine", ["fixed-lag", "rts"])
+@pytest.mark.parametrize("engine", ["fixed-lag", "gtsam"])
 def test_broken_off_anywhere_and_gone_on_with_it_writes_the_same_files(
     engine, recording, tmp_path, monkeypatch
 ):

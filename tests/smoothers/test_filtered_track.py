@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph.smoothers.filtered_track import FilteredTrack, tracks_of
-from jeat_graph.smoothers.state_rts import FilterRecord, smooth
+from jeat_graph.smoothers.filtered_track import FilteredTrack, smoothed_together, tracks_of
+from jeat_graph.smoothers.state_rts import FilterRecord
 
 H = np.array([[1.0, 0.0, 0.0]])
 R = 4.0
@@ -129,18 +129,20 @@ def test_records_of_many_tracks_come_apart_by_track():
             name: np.stack([getattr(track, name)[k] for track in there])
             for name in ("F", "predicted_mean", "predicted_covariance", "mean", "covariance")
         }
-        return FilterRecord(np.array([1, 7][: len(there)]), stacked.pop("F"), **stacked)
+        sensor = np.array([track.sensor[k] for track in there])
+        return FilterRecord(np.array([1, 7][: len(there)]), stacked.pop("F"), **stacked, sensor=sensor)
 
     records = [record(k) for k in range(6)]
-    sensors = [np.array([one.sensor[k], other.sensor[k]][: len(records[k].track_id)]) for k in range(6)]
-    tracks = tracks_of(records, list(one.t), sensors)
+    tracks = tracks_of(records, list(one.t))
     assert [track.track_id for track in tracks] == [1, 7]
     assert [len(track) for track in tracks] == [6, 3]
     np.testing.assert_array_equal(tracks[1].mean, other.mean[2:5])
     np.testing.assert_array_equal(tracks[0].sensor, one.sensor)
-    smoothed = {k: mean for k, mean, _ in smooth(records)}
-    np.testing.assert_allclose(tracks[0].smoothed()[0][0], smoothed[0][0], rtol=1e-9)
+    np.testing.assert_array_equal(tracks[1].sensor, other.sensor[2:5])
+    together = smoothed_together(tracks)
+    for track, (mean, _) in zip(tracks, together, strict=True):
+        np.testing.assert_array_equal(mean, track.smoothed()[0])
 
 
 def test_no_records_are_no_tracks():
-    assert tracks_of([], [], []) == []
+    assert tracks_of([], []) == []

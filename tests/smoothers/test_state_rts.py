@@ -6,7 +6,8 @@ import numpy as np
 
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.smoothers.state_rts import FilterRecord, smooth
+from jeat_graph.smoothers.filtered_track import smoothed_together, tracks_of
+from jeat_graph.smoothers.state_rts import FilterRecord
 
 C = ModelConstants()
 
@@ -54,13 +55,15 @@ def test_smoothed_states_are_the_least_squares_solution():
         )
         mean, P = means[0, 0], covariances[0, 0]
         states = (before[0][None, None], before[1][None, None], means, covariances)
-        records.append(FilterRecord(np.array([1]), model.F[None, None], *states))
+        records.append(FilterRecord(np.array([1]), model.F[None, None], *states, np.array([0])))
     want_mean, want_covariance = dense_solve(prior, [m.F for m in models], shifts, noises, H, R, z)
-    for k, got, covariance in smooth(records):
+    (track,) = tracks_of(records, np.cumsum(steps).tolist())
+    means, covariances = track.smoothed()
+    for k in range(len(steps)):
         scale = np.sqrt(np.diag(want_covariance[k]))
-        np.testing.assert_allclose((got[0, 0] - want_mean[k]) / scale, 0.0, atol=1e-6)
+        np.testing.assert_allclose((means[k, 0] - want_mean[k]) / scale, 0.0, atol=1e-6)
         np.testing.assert_allclose(
-            covariance[0, 0] / np.outer(scale, scale), want_covariance[k] / np.outer(scale, scale), atol=1e-6
+            covariances[k, 0] / np.outer(scale, scale), want_covariance[k] / np.outer(scale, scale), atol=1e-6
         )
 
 
@@ -70,10 +73,16 @@ def test_tracks_come_and_go():
     def record(ids):
         n = len(ids)
         mean, P = np.zeros((n, 1, 5)) + np.array(ids)[:, None, None], np.repeat(one, n, axis=0)
-        return FilterRecord(np.array(ids), P, mean, 2.0 * P, mean, P)
+        return FilterRecord(np.array(ids), P, mean, 2.0 * P, mean, P, np.zeros(n, dtype=np.int64))
 
-    out = {k: (mean, P) for k, mean, P in smooth([record([1]), record([1, 2]), record([2, 5]), record([])])}
-    np.testing.assert_allclose(out[1][0][:, 0, 0], [1.0, 2.0])
-    # Track 1 ends at record 1 and keeps its covariance; the next record tells of track 2, with G = 1/2.
-    np.testing.assert_allclose(out[1][1][:, 0, 0, 0], [1.0, 0.75])
-    assert out[3][0].shape == (0, 1, 5)
+    steps = [record([1]), record([1, 2]), record([2, 5]), record([2])]
+    tracks = tracks_of(steps, [0.0, 1.0, 2.0, 3.0])
+    found = smoothed_together(tracks)
+    assert [track.track_id for track in tracks] == [1, 2, 5]
+    assert [len(mean) for mean, _ in found] == [2, 3, 1]
+    for track, (mean, _) in zip(tracks, found, strict=True):
+        np.testing.assert_allclose(mean[:, 0, 0], track.track_id)
+    # With G = 1/2 a record has half of what the next one is narrower than predicted; the last one stays.
+    np.testing.assert_allclose(found[0][1][:, 0, 0, 0], [0.75, 1.0])
+    np.testing.assert_allclose(found[1][1][:, 0, 0, 0], [0.6875, 0.75, 1.0])
+    np.testing.assert_allclose(found[2][1][:, 0, 0, 0], [1.0])

@@ -17,7 +17,7 @@ from jeat_graph.tracking.classes import MOST_CLASSES
 from jeat_graph.tracking.tracker import Tracker
 
 KINDS = np.array(["bus", "car", "truck", ""])
-ENGINES = pytest.mark.parametrize("engine", ["fixed-lag", "fixed-lag-rts", "rts", "full"])
+ENGINES = pytest.mark.parametrize("engine", ["fixed-lag", "full", "gtsam"])
 
 
 def recording(named: bool = True, steps: int = 60, seed: int = 3) -> Detections:
@@ -83,7 +83,7 @@ def test_smoothed_rows_have_the_class_of_all_that_their_track_took_in(engine):
     for batch in detections.batches():
         tracker.step(batch)
     table, said = tracker.finish(), said_of(detections)
-    whole = engine in ("rts", "full")
+    whole = engine == "full"
     for row in range(len(table)):
         t = float(table.t[row])
         known = {majority(said, vehicle_of(table, row), end) for end in np.arange(t + 1e-6, 3.1, 0.05)}
@@ -111,7 +111,7 @@ def test_without_classes_every_byte_is_as_it_was_and_with_them_all_else_is(tmp_p
 
 
 def test_files_keep_classes(tmp_path):
-    tracker = Tracker(config("rts"))
+    tracker = Tracker(config("full"))
     list(tracker.run(recording()))
     table = tracker.finish()
     for name in ("t.csv", "t.parquet"):

@@ -20,7 +20,7 @@ _PICTURE = ["image.width=1280", "image.height=720", "input.picture=given"]
 _SMOOTHERS = {
     "none": ["smoother.engine=none"],
     "lag": ["smoother.lag_s=.4"],
-    "whole": ["smoother.engine=rts"],
+    "whole": ["smoother.engine=full"],
 }
 
 

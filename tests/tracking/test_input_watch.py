@@ -95,7 +95,7 @@ def test_few_boxes_are_no_ground_for_a_word_about_corners():
 
 
 def test_a_warning_that_is_made_an_error_leaves_the_tracker_as_it_was():
-    tracker = Tracker(load_config("default", ["smoother.engine=rts"]))
+    tracker = Tracker(load_config("default", ["smoother.engine=full"]))
     with warnings.catch_warnings():
         warnings.simplefilter("error", InputWarning)
         for k in range(12):

@@ -12,7 +12,8 @@ from hypothesis.extra import numpy as hnp
 
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.tracking.model_measured import StepBoxes, records_of
+from jeat_graph.tracking.engine import StepBoxes
+from jeat_graph.tracking.model_measured import records_of
 
 C = ModelConstants()
 Q = singer.ProcessNoise(0.0, 0.0, 0.0, 0.0)

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from jeat_graph import Tracker, load_config
+from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.core import tracking as compiled
 from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError, TimeOrderError
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.score_calibration import logit
+from jeat_graph.tracking.core_model import CoreModel
+from jeat_graph.tracking.engine import Looked
 from jeat_graph.tracking.model_tracker import ModelTracker
 from jeat_graph.tracking.reference_model import ReferenceModel
 
@@ -180,14 +183,15 @@ def test_embeddings_of_another_length_are_refused_and_change_nothing():
 
 def test_looks_decide_who_takes_a_box_and_not_whether_there_is_an_object():
     answers = []
-    for make in (compiled.Model, ReferenceModel):
-        model = make(ModelConstants(), 1280.0, 720.0, True, -1.0)
-        model.declare_sensor()
+    for make in (CoreModel, ReferenceModel):
+        settings = ["smoother.engine=none", "image={width: 1280, height: 720}"]
+        model = make(ModelConstants(), load_config("default", settings))
+        model.declare_sensor("cam", SensorConfig())
         one = np.ones(1, np.int64)
         for k in range(30):
-            boxes = np.array([[100.0 + k, 100.0, 140.0 + k, 130.0], [400.0, 400.0, 440.0, 440.0]])
+            boxes = np.array([[100.0 + k, 100.0, 40.0, 30.0], [400.0, 400.0, 40.0, 40.0]])
             alike = np.full((model.size(), 2), -5.0)  # nobody looks like himself, nor like the other
-            model.take(0.05 * k, 0 * one, 2 * one, boxes, np.full(2, 2.0), alike)
+            model.take(Looked(0.05 * k, 0 * one, 2 * one, boxes, np.full(2, 0.88), alike))
         answers.append((model.rows()[1].tolist(), model.born(), model.rows()[4]))
     assert answers[0][0] == answers[1][0] == [1, 2]
     assert answers[0][1] == answers[1][1] == 2
@@ -218,7 +222,7 @@ def test_the_score_at_which_a_box_is_as_likely_real_as_not_is_believed(engine):
         for t, sensor, boxes, _ in moving(20):
             table = tracker.step((t, sensor, boxes, [0.6, 0.6]))
         born[even] = float(tracker.step((1.0, "cam", [], [])).existence.sum()) if len(table) else 0.0
-        learnt = tracker._model.learnt()["indifference"]
+        learnt = tracker._model.learnt().belief.indifference
         if even != "null":
             assert learnt[0] == pytest.approx(-float(logit(np.array(float(even)))))
     assert born[".95"] < born[".2"]
@@ -266,7 +270,7 @@ def test_that_an_event_camera_sees_nothing_that_stands_is_learnt():
                     centres = table.boxes[:, None, :2] + table.boxes[:, None, 2:] / 2.0
                     off = np.linalg.norm(centres - standing[None], axis=2)
                     there += (off.min(axis=0, initial=np.inf) < 20.0).tolist()
-            blind = tracker._model.learnt()["stationary_unseen"]
+            blind = tracker._model.learnt().belief.stationary_unseen
         reported[name] = np.mean(there)
     assert blind[0] < 1e-6
     assert reported["learnt"] > 0.85

@@ -110,7 +110,7 @@ def test_classes_survive():
 
 
 def test_an_unknown_engine_is_named():
-    with pytest.raises(ConfigError, match=r"engine is one of core, reference, paper, not 'fast'"):
+    with pytest.raises(ConfigError, match=r"engine: 'fast' is not one of core, reference, paper"):
         Tracker(engine="fast")
 
 

@@ -132,10 +132,11 @@ struct LastingError {
 
 inline double object_size(const double* mean) { return exp_of(0.5 * (mean[kLogSize] + mean[kStates + kLogSize])); }
 
+inline double mean_growth(const double* mean) { return 0.5 * (mean[kGrowth] + mean[kStates + kGrowth]); }
+
 // The transition of a track that moves at constant speed in space: a = 2 g v, dg/dt = g^2 (g the rate of ln size).
-inline Matrix in_perspective(const Matrix& F, const double* mean, double dt, const ModelConstants& c) {
+inline Matrix in_perspective(const Matrix& F, double g, double dt, const ModelConstants& c) {
     Matrix out = F;
-    const double g = 0.5 * (mean[kGrowth] + mean[kStates + kGrowth]);
     const double x = clamp(g * dt, -c.most_perspective, c.most_perspective);
     if (std::abs(x) < kLeastPerspective) return out;
     const double faster = exp_of(2.0 * x), further = (faster - 1.0) / (2.0 * x);
@@ -164,7 +165,7 @@ inline constexpr int kDriven[kStates][2] = {{kPosition, kAcceleration}, {kVeloci
 // m <- F m, P <- F P F' + Q.
 inline void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
                     const ModelConstants& c) {
-    const Matrix F = in_perspective(step.F, mean, dt, c);
+    const Matrix F = in_perspective(step.F, mean_growth(mean), dt, c);
     const double size = object_size(mean);
     std::array<double, kMean> predicted{};
     for (int axis = 0; axis < 2; ++axis)

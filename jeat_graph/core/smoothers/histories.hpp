@@ -92,19 +92,22 @@ struct Record {
     bool begins_anew = false;            // all tracks had ended before the step
     std::vector<std::int64_t> track_id;  // of the tracks after it, before any of them ended
     std::vector<std::size_t> tracks;     // how many there were after each scan
+    std::vector<std::size_t> known;      // of these, how many had been born before it
     std::vector<std::size_t> sensors;    // whose scan each was
     std::vector<Entry> entries;          // scan by scan, in the order of the tracks
+    std::vector<double> growth;          // of each entry's track before its step: its transition follows from that
     std::vector<std::uint8_t> kept;      // which of the tracks live on
     GapCounts gaps, gaps_after;          // before and after tracks ended
 
     void begin(double time) {
         t = time;
         begins_anew = false;
-        track_id.clear(), tracks.clear(), sensors.clear(), entries.clear(), kept.clear();
+        track_id.clear(), tracks.clear(), known.clear(), sensors.clear(), entries.clear(), growth.clear(), kept.clear();
     }
     // The entries of a scan of so many tracks; more may be born in it.
     Entry* begin_scan(std::size_t number, std::size_t sensor) {
         sensors.push_back(sensor);
+        known.push_back(number);
         entries.resize(entries.size() + number);
         tracks.push_back(number);
         return entries.data() + entries.size() - number;
@@ -215,7 +218,8 @@ private:
             mean_[k] = now.mean;
             unfold(now.covariance, covariance_[k].data());
             unfold(later.predicted_covariance, predicted.data());
-            const Matrix F = filters::in_perspective(transition(later.dt, c), now.mean.data(), later.dt, c);
+            const double growth = filters::mean_growth(now.mean.data());
+            const Matrix F = filters::in_perspective(transition(later.dt, c), growth, later.dt, c);
             for (int axis = 0; axis < 2; ++axis) {
                 const int m = axis * kStates, p = axis * kMatrix;
                 rts_axis(&mean_[k][m], &covariance_[k][p], F, &later.predicted_mean[m], &predicted[p],

@@ -18,7 +18,7 @@ using smoothers::Called;
 // Time, identity, mean, variance, posterior, sensors, number of the class, its share.
 using Table = std::tuple<Out<double>, Out<std::int64_t>, Out2<double>, Out2<double>, Out<double>, Out<std::int64_t>,
                          Out<std::int64_t>, Out<double>>;
-using Named = nb::typed<nb::dict, nb::str, nb::any>;
+using Named = nb::typed<nb::dict, nb::str, nb::object>;
 
 // After so long without any scan all tracks are over: longer predictions outgrow a double's digits (s).
 constexpr double kLongestSilenceS = 300.0;
@@ -29,13 +29,19 @@ struct Moment {
     Answer answer;
 };
 
-using Scans = std::tuple<Out<std::int64_t>, Out<std::int64_t>, Out2<double>, Out2<double>, Out2<double>,
+using Scans = std::tuple<Out<std::int64_t>, Out<std::int64_t>, Out<std::int64_t>, Out2<double>, Out2<double>, Out2<double>, Out2<double>,
                          Out2<double>>;
 
-Scans scans_of(const Record& record) {
-    std::vector<double> predicted, predicted_covariance, mean, covariance;
+Scans scans_of(const Record& record, const ModelConstants& c) {
+    std::vector<double> transitions, predicted, predicted_covariance, mean, covariance;
     std::array<double, kCovariance> whole;
-    for (const smoothers::Entry& entry : record.entries) {
+    double dt = 0.0;
+    Matrix still = filters::discretise(dt, c).F;
+    for (std::size_t k = 0; k < record.entries.size(); ++k) {
+        const smoothers::Entry& entry = record.entries[k];
+        if (entry.dt != dt) dt = entry.dt, still = filters::discretise(dt, c).F;
+        const Matrix F = filters::in_perspective(still, record.growth[k], dt, c);
+        transitions.insert(transitions.end(), F.begin(), F.end());
         predicted.insert(predicted.end(), entry.predicted_mean.begin(), entry.predicted_mean.end());
         smoothers::unfold(entry.predicted_covariance, whole.data());
         predicted_covariance.insert(predicted_covariance.end(), whole.begin(), whole.end());
@@ -45,8 +51,31 @@ Scans scans_of(const Record& record) {
     }
     const std::vector<std::int64_t> sensors(record.sensors.begin(), record.sensors.end());
     const std::vector<std::int64_t> tracks(record.tracks.begin(), record.tracks.end());
-    return {array_of(sensors), array_of(tracks), array_of(predicted, kMean),
+    const std::vector<std::int64_t> known(record.known.begin(), record.known.end());
+    return {array_of(sensors), array_of(tracks), array_of(known), array_of(transitions, kMatrix), array_of(predicted, kMean),
             array_of(predicted_covariance, kCovariance), array_of(mean, kMean), array_of(covariance, kCovariance)};
+}
+
+using Told = std::tuple<double, bool, Out<double>, Out<std::int64_t>, Out<std::uint8_t>, Out<double>, Out<std::uint8_t>>;
+
+Told told_of(const Record& record) {
+    std::vector<double> real, missed;
+    std::vector<std::int64_t> used;
+    std::vector<std::uint8_t> confirmed;
+    for (std::size_t k = record.entries.size() - record.track_id.size(); k < record.entries.size(); ++k) {
+        const smoothers::Entry& entry = record.entries[k];
+        real.push_back(entry.real), used.push_back(entry.used);
+        confirmed.push_back(entry.confirmed), missed.push_back(entry.missed);
+    }
+    return {record.t, record.begins_anew, array_of(real), array_of(used), array_of(confirmed), array_of(missed),
+            array_of(record.kept)};
+}
+
+// Gaps that outlasted each bin, and of these those that ended well.
+Out2<double> gaps_of(const GapCounts& gaps) {
+    std::vector<double> both(gaps.ended.begin(), gaps.ended.end());
+    both.insert(both.end(), gaps.ended_well.begin(), gaps.ended_well.end());
+    return array_of(both, filters::kGapBins);
 }
 
 // A tracker of the model: its state, its step, and what it keeps for the smoother.
@@ -107,6 +136,8 @@ public:
 
     // Keep what the last step gave the smoother, for hand_over.
     Record record() { return std::move(record_); }
+    Out2<double> gaps() const { return gaps_of(now_.state.gaps); }
+    const ModelConstants& constants() const { return now_.state.constants; }
     bool boxes_end_at_edge() const { return now_.state.boxes_end_at_edge(); }
 
     // Tell the smoother of a step that nothing can come before any more; of the last one without a record.
@@ -279,9 +310,17 @@ void bind(nb::module_& module) {
     nb::class_<Record>(module, "Record", "What the filter did in a step, for the smoother.")
         .def("track_ids", [](const Record& record) { return array_of(record.track_id); },
              "Identities of the tracks after it, before any ended (N,).")
-        .def("scans", &scans_of,
-             "Scan by scan, in the order they were taken in: index of the sensor (K,) and number of tracks after it (K,);\n"
-             "of these, one scan after the other, mean (E, 14) and covariance (E, 98) before the update, and after it.");
+        .def("scans", [](const Record& record, const Model& model) { return scans_of(record, model.constants()); },
+             nb::arg("model"),
+             "Scan by scan, in the order they were taken in: index of the sensor (K,), number of tracks after it (K,),\n"
+             "and of those among them that had been born before (K,); of these, one scan after the other, the transition (E, 49) from the record before, both axes alike, and mean\n"
+             "(E, 14) and covariance (E, 98) before the update, and after it.")
+        .def("told", &told_of,
+             "Time (s), whether all tracks had ended before; of the tracks (N,) their posterior, the sensors that found\n"
+             "them, whether one of these confirms that they are there, the detections missed since, and whether they live on.")
+        .def("gaps", [](const Record& record) { return gaps_of(record.gaps); },
+             "Gaps that outlasted each bin, and those that ended well (2, 9), before tracks ended.")
+        .def("gaps_after", [](const Record& record) { return gaps_of(record.gaps_after); }, "The same after it.");
     nb::class_<Moment>(module, "Moment", "All that the next step depends on; the smoother is no part of it.")
         .def("identities", [](const Moment& moment) { return array_of(moment.state.tracks.track_id); },
              "Identities of the living tracks (N,).")
@@ -338,6 +377,7 @@ void bind(nb::module_& module) {
         .def("smoothed", &Model::smoothed, "Smoothed rows so far, columns as those of rows.")
         .def("drain", &Model::drain, "Smoothed rows that have become final; they are forgotten.")
         .def("finish", &Model::finish, "The same, all tracks being ended.")
+        .def("gaps", &Model::gaps, "Gaps that outlasted each bin, and those that ended well (2, 9).")
         .def("learnt", &Model::learnt, "What is believed of the sensors and the scene, by name.")
         .def("tracks", &Model::tracks, "Columns of the living tracks, by name.");
 }

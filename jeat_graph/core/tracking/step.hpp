@@ -50,6 +50,7 @@ public:
         for (const std::size_t place : order_of(scans)) {
             Scan& scan = scans[place];
             const ScanClock clock = look(t, scan);
+            if (record) write_growth(*record);
             predict(t);
             correct_boxes(scan);
             follow_picture(motion, scan);
@@ -552,6 +553,9 @@ private:
                      c_.track_p_detect_bounds.low, c_.track_p_detect_bounds.high);
     }
 
+    void write_growth(Record& record) {
+        for (std::size_t i = 0; i < s_.tracks.size(); ++i) record.growth.push_back(mean_growth(s_.tracks.mean_of(i)));
+    }
     void write_predictions(Record& record, std::size_t sensor) {
         Tracks& tracks = s_.tracks;
         smoothers::Entry* const entries = record.begin_scan(tracks.size(), sensor);
@@ -561,6 +565,7 @@ private:
         Tracks& tracks = s_.tracks;
         const std::size_t before = record.tracks.back();
         smoothers::Entry* const entries = record.grow_scan(tracks.size());
+        record.growth.resize(record.entries.size(), 0.0);
         for (std::size_t i = before; i < tracks.size(); ++i) begin_entry(entries[i], i, 0.0);
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             std::copy_n(tracks.mean_of(i), kMean, entries[i].mean.begin());

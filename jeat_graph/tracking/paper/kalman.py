@@ -77,6 +77,14 @@ def predict(tracks: PaperTracks, dt: float, config: PaperConfig) -> PaperTracks:
     return replace(tracks, mean=mean, cov=cov, size_mean=size_mean, size_cov=size_cov, used=used)
 
 
+def transition(dt: float) -> FloatArray:
+    """Return the transition (5, 5) of motion and size over `dt` seconds."""
+    out = np.eye(5)
+    if dt > 0.0:
+        out[:3, :3], out[3:, 3:] = motion_model(dt, 0.0)[0], size_model(dt, 0.0)[0]
+    return out
+
+
 def correct(
     mean: FloatArray, cov: FloatArray, z: FloatArray, R: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -80,14 +80,15 @@ class PaperTracks:
         new = np.ones((len(self), sensors - self.scale.shape[1]))
         return replace(self, scale=np.concatenate([self.scale, new], axis=1))
 
-    def sizes(self) -> FloatArray:
-        """Return width and height (N, 2) of each track's box (px)."""
-        return sizes_of(self.size_mean)
 
-
-def sizes_of(size_mean: FloatArray) -> FloatArray:
-    """Return width and height (..., 2) of logarithms and their rates (..., 2, 2), in px."""
-    return np.asarray(np.exp(np.minimum(size_mean[..., 0], MOST_LOG_SIZE)))
+def together(tracks: PaperTracks) -> tuple[FloatArray, FloatArray]:
+    """Return states as means (N, 2, 5) and covariances (N, 2, 5, 5): motion, then size, of each axis."""
+    mean = np.concatenate([tracks.mean, tracks.size_mean], axis=2)
+    covariance = np.zeros((len(tracks), 2, mean.shape[2], mean.shape[2]))
+    motion = tracks.mean.shape[2]
+    covariance[:, :, :motion, :motion] = tracks.cov[:, None]
+    covariance[:, :, motion:, motion:] = tracks.size_cov[:, None]
+    return mean, covariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +101,7 @@ class Found:
         sensor: (M,) index of each one's sensor.
         noise: (M,) variance R_base g(p) of a centre along either axis, before the track's factor (px²).
         log_size_var: (M,) variance of a logarithm.
+        place: (M,) of each one's sensor among the names of all in alphabetical order.
     """
 
     z: FloatArray
@@ -107,6 +109,7 @@ class Found:
     sensor: IntArray
     noise: FloatArray
     log_size_var: FloatArray
+    place: IntArray
 
     def __len__(self) -> int:
         return len(self.z)

@@ -8,31 +8,32 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.config.paper import PaperConfig
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.smoothers.state_rts import FilterRecord
 from jeat_graph.tracking.paper.association import gated_pairs, match, second_views
-from jeat_graph.tracking.paper.kalman import born, noise_of, predict, update
-from jeat_graph.tracking.paper.state import Found, PaperTracks
+from jeat_graph.tracking.paper.kalman import born, predict, transition, update
+from jeat_graph.tracking.paper.state import Found, PaperTracks, together
 
 #: After so long without any scan all tracks are over: longer predictions outgrow a double's digits (s).
 LONGEST_SILENCE_S = 300.0
 
 
 class Stepped(NamedTuple):
-    """The tracks after a step, and what they took in.
+    """The tracks after a step, and how the filter went through it.
 
     Attributes:
-        tracks: N tracks; those born in the step are the last ones.
+        every: N tracks, those that end included; those born in the step are the last ones.
         births: how many of them.
+        kept: (N,) which live on.
         taker: (M,) identity of the track that each detection went to.
-        z: (N, 2) mean of the centres that the track took in the step, weighed by their information (px).
-        information: (N,) of that mean along either axis, 0 where there was none, and at birth (1/px²).
+        records: for the smoother, one for each round of updates.
     """
 
-    tracks: PaperTracks
+    every: PaperTracks
     births: int
+    kept: BoolArray
     taker: IntArray
-    z: FloatArray
-    information: FloatArray
+    records: list[FilterRecord]
 
 
 def step(
@@ -52,14 +53,17 @@ def step(
         tracks = tracks.take(np.zeros(0, dtype=np.int64))
     tracks = predict(tracks, dt, config)
     taker = np.zeros(len(found), dtype=np.int64)
-    weighed, information = np.zeros((len(tracks), 2)), np.zeros(len(tracks))
+    rounds = [_Round(tracks, tracks, np.full(len(tracks), -1))]
 
     def take(row: IntArray, detection: IntArray) -> PaperTracks:
-        told = 1.0 / noise_of(tracks, row, found, detection)
-        information[row] += told
-        weighed[row] += told[:, None] * found.z[detection]
         taker[detection] = tracks.track_id[row]
-        return update(tracks, row, found, detection, t, config)
+        sensor = np.full(len(tracks), -1)
+        sensor[row] = found.sensor[detection]
+        after = update(tracks, row, found, detection, t, config)
+        if len(rounds) == 1 and (rounds[0].sensor < 0).all():
+            rounds.clear()
+        rounds.append(_Round(tracks, after, sensor))
+        return after
 
     if len(tracks) and len(found):
         row, detection = match(gated_pairs(tracks, found, config.gate), config.gate)
@@ -70,18 +74,45 @@ def step(
             pairs = gated_pairs(tracks, found, config.gate)
             free = (taker[pairs.detection] == 0) & (found.sensor[pairs.detection] == sensor)
             other = (first[pairs.row] >= 0) & (first[pairs.row] != sensor)
-            tracks = take(*second_views(pairs.take(free & other)))
-    z = weighed / np.where(information > 0.0, information, 1.0)[:, None]
+            again = second_views(pairs.take(free & other))
+            if len(again[0]):
+                tracks = take(*again)
     tracks = confirm(tracks, t, config)
     alive = lives(tracks, t, config)
     left = np.flatnonzero(taker == 0)
     # Numbered by sensor, whichever scan of this time came first.
-    left = left[np.argsort(found.sensor[left], kind="stable")]
+    left = left[np.argsort(found.place[left], kind="stable")]
     new = confirm(born(found, left, t, first_id, tracks.scale.shape[1], config), t, config)
     taker[left] = new.track_id
-    z = np.concatenate([z[alive], found.z[left]])
-    information = np.concatenate([information[alive], np.zeros(len(left))])
-    return Stepped(tracks.take(alive).join(new), len(left), taker, z, information)
+    kept = np.concatenate([np.isin(np.arange(len(tracks)), alive), np.ones(len(left), dtype=np.bool_)])
+    every = tracks.join(new)
+    F = transition(dt)
+    records = [_record(one, F if k == 0 else np.eye(len(F))) for k, one in enumerate(rounds)]
+    records[-1] = _with_births(records[-1], new, found.sensor[left])
+    return Stepped(every, len(left), kept, taker, records)
+
+
+class _Round(NamedTuple):
+    """One round of updates: tracks before and after it, and the sensors (N,) whose boxes they took, or −1."""
+
+    before: PaperTracks
+    after: PaperTracks
+    sensor: IntArray
+
+
+def _record(one: _Round, F: FloatArray) -> FilterRecord:
+    """Return what the smoother needs of a round."""
+    n = len(one.before)
+    F = np.broadcast_to(F, (n, 1, *F.shape))
+    return FilterRecord(one.before.track_id, F, *together(one.before), *together(one.after), one.sensor)
+
+
+def _with_births(record: FilterRecord, new: PaperTracks, sensor: IntArray) -> FilterRecord:
+    """Return a record with tracks that begin at boxes; of these no prediction is ever asked."""
+    mean, covariance = together(new)
+    still = np.broadcast_to(np.eye(mean.shape[2]), (len(new), 1, mean.shape[2], mean.shape[2]))
+    more = (new.track_id, still, mean, covariance, mean, covariance, sensor)
+    return FilterRecord(*(np.concatenate(pair) for pair in zip(record, more, strict=True)))
 
 
 def confirm(tracks: PaperTracks, t: float, config: PaperConfig) -> PaperTracks:

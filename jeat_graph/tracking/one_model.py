@@ -1,0 +1,141 @@
+"""What the core and the reference have in common: both are the one model, in C++ and in NumPy."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jeat_graph.config.schema import Config
+from jeat_graph.config.sensors import SensorConfig
+from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
+from jeat_graph.filters import singer
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.filters.object_probability import SensorBelief
+from jeat_graph.filters.score_calibration import logit
+from jeat_graph.smoothers.histories import Existence
+from jeat_graph.smoothers.rows import ModelRows, Told
+from jeat_graph.tracking.engine import StepBoxes
+from jeat_graph.tracking.hypotheses import Hypotheses, hypotheses_of
+from jeat_graph.tracking.model_measured import records_of
+from jeat_graph.tracking.prediction import predicted
+from jeat_graph.tracking.record_smoothing import SmoothsRecords, histories_of
+from jeat_graph.tracking.sensor_state import SensorState
+
+
+class Learnt(NamedTuple):
+    """What is believed of S sensors and the scene.
+
+    Attributes:
+        belief: of the sensors.
+        log_side_variance: (S,) ln of the variances of their boxes' sides.
+        log_scene_variance: the same of the scene; 0 before the first scan.
+        leftovers: (S,) mean number of boxes in a scan that no track takes,
+        false_boxes: (S,) and that are of nothing real.
+        offsets: (S, 4) of the boxes, as `sensor_offsets` has them.
+        boxes_at_edge: (S,) number of boxes that end at the edge of the picture,
+        boxes_beyond: (S,) and that reach beyond it.
+        process_noise: of the scene.
+    """
+
+    belief: SensorBelief
+    log_side_variance: FloatArray
+    log_scene_variance: float
+    leftovers: FloatArray
+    false_boxes: FloatArray
+    offsets: FloatArray
+    boxes_at_edge: FloatArray
+    boxes_beyond: FloatArray
+    process_noise: singer.ProcessNoise
+
+
+def told_of(c: ModelConstants) -> Told:
+    """Return how tables tell the states of the model."""
+    return Told(partial(singer.told_motion, c=c), partial(singer.told_covariance, c=c))
+
+
+def even_logit_of(said: SensorConfig) -> float:
+    """Return the logit of the score at which a box is as likely real as not; NaN where it is to be learnt."""
+    return math.nan if said.even_score is None else float(logit(np.array(said.even_score)))
+
+
+class OneModel(SmoothsRecords):
+    """What follows from the state of the model, whoever computes it.
+
+    Args:
+        constants: of the model.
+        config: of which the smoother matters here.
+        by_records: whether its records are smoothed here.
+    """
+
+    #: What an engine of the model has; see `Engine`.
+    has_fit = True
+    weighs = True
+    compares_looks = True
+
+    def __init__(self, constants: ModelConstants, config: Config, by_records: bool = True) -> None:
+        told, existence = told_of(constants), Existence(constants)
+        super().__init__(histories_of(config, existence, told) if by_records else None)
+        self.constants = constants
+
+    @abstractmethod
+    def learnt(self) -> Learnt:
+        """Return what is believed of the sensors and the scene."""
+
+    @abstractmethod
+    def tracks(self) -> Mapping[str, Any]:
+        """Return the columns of the living tracks by name."""
+
+    @abstractmethod
+    def rows(self) -> ModelRows:
+        """Return the tracks that the last step reports."""
+
+    @abstractmethod
+    def states(self) -> tuple[FloatArray, FloatArray]:
+        """Return their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7."""
+
+    @abstractmethod
+    def takers(self) -> IntArray:
+        """Return the identity of the track (M,) that took each box of the last step."""
+
+    @abstractmethod
+    def fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return how well the boxes of the last step fitted; see `Engine.fit`."""
+
+    def predicted(self, t: float) -> tuple[ModelRows, FloatArray]:
+        """Return the reported tracks at a later time; see `Engine.predicted`."""
+        learnt = self.learnt()
+        noise = learnt.process_noise, learnt.log_scene_variance
+        return predicted(self.rows(), self.states(), t, noise, self.constants)
+
+    def sensor_states(self) -> list[SensorState]:
+        """Return what has been learnt of each sensor."""
+        learnt, belief = self.learnt(), self.learnt().belief
+        noise = np.exp(learnt.log_side_variance) / self.constants.side_std**2
+        believed = 1.0 / (1.0 + np.exp(-belief.prior_odds))
+        offsets = learnt.offsets.tolist()
+        return [
+            SensorState(
+                clutter=float(learnt.false_boxes[k]),
+                p_detect=float(belief.p_detect[k]),
+                precision=float(believed[k]),
+                unseen=float(belief.unseen[k]),
+                stationary_unseen=float(belief.stationary_unseen[k]),
+                noise_scale=float(noise[k]),
+                offset_centre_share=(offsets[k][0], offsets[k][1]),
+                offset_log_size=(offsets[k][2], offsets[k][3]),
+            )
+            for k in range(len(noise))
+        ]
+
+    def measurements(self, told: StepBoxes) -> RecordArray:
+        """Return the boxes of the last step as the filter weighed them; see `Engine.measurements`."""
+        return records_of(told, self.takers(), self.fit(), self.learnt().process_noise, self.constants)
+
+    def hypotheses(self, t: float, shown: IntArray, sensors: tuple[str, ...]) -> Hypotheses:
+        """Return what the living tracks are taken for, and why; see `Engine.hypotheses`."""
+        return hypotheses_of(self.tracks(), self.learnt().belief, self.constants, t, shown, sensors)

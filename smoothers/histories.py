@@ -1,0 +1,455 @@
+"""What the filter did to every living track, and the smoothed rows that follow from it.
+
+A track's rows are final when it has ended, or with a finite lag when so much time has followed: then the
+window of two lags is smoothed and its older half is given out. So memory does not grow with time.
+`core/smoothers/histories.hpp` does the same for the core's own pass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.filters import gap_survival
+from jeat_graph.filters.gap_survival import GapCounts
+from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.smoothers.filtered_track import FilteredTrack, smoothed_together
+from jeat_graph.smoothers.rows import Called, ModelRows, Told, joined, rows_of
+from jeat_graph.smoothers.state_rts import FilterRecord
+
+# Tracks that have ended wait until so many are smoothed together.
+_MOST_WAITING = 32
+# Tracks that began together are given out one after the other: each waits for a share of the second lag.
+_GOLDEN, _LOW_BITS = 0.6180339887498949, 0xFFFF
+
+
+class StepRecord(NamedTuple):
+    """What the filter did in one step; every engine hands over the same.
+
+    Attributes:
+        t: its time (s).
+        begins_anew: whether all tracks had ended before it.
+        track_id: (N,) the tracks after it, before any of them ended, ascending.
+        scans: of its scans in the order they were taken in, each with the first of these tracks: those that
+            had been born.
+        real: (N,) their posterior.
+        used: (N,) the sensors that found them.
+        confirmed: (N,) whether a detection of that time tells that they are still there.
+        missed: (N,) detections that were to be expected since one confirmed them, 0 where it is of that time.
+        kept: (N,) which of them live on.
+        gaps: that have been counted before tracks ended,
+        gaps_after: and after it.
+    """
+
+    t: float
+    begins_anew: bool
+    track_id: IntArray
+    scans: list[FilterRecord]
+    real: FloatArray
+    used: IntArray
+    confirmed: BoolArray
+    missed: FloatArray
+    kept: BoolArray
+    gaps: GapCounts
+    gaps_after: GapCounts
+
+    def track_ids(self) -> IntArray:
+        """Return the identities (N,) of the tracks after it, before any ended."""
+        return self.track_id
+
+
+class Existence(NamedTuple):
+    """Which rows a smoothed table has.
+
+    Attributes:
+        constants: of the model, of which it takes what counts as sure, and from when on a row is given.
+        of_any_time: whether a track is what it was taken for at any time, and not at its last detection; no
+            row of it is given before.
+    """
+
+    constants: ModelConstants
+    of_any_time: bool = False
+
+
+class Solver(Protocol):
+    """Smooths windows of tracks: each begins with a filtered state, and its records follow one another."""
+
+    def smoothed(
+        self, windows: Sequence[FilteredTrack], wanted: Sequence[int], final: bool
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return means (K, A, D) and covariances (K, A, D, D) of the first records of each window.
+
+        Args:
+            windows: of tracks.
+            wanted: how many of each one's records.
+            final: whether rows are given out of them; else nobody may notice that they were asked for.
+        """
+
+    def leave(self, track_id: int, count: int) -> None:
+        """Take note that the first records of a track's window were given out and are in it no more."""
+
+    def end(self, track_id: int) -> None:
+        """Forget a track."""
+
+    def settle(self) -> None:
+        """Forget what can be made again of windows."""
+
+    def counts(self) -> dict[str, int]:
+        """Return what it counts, by name."""
+
+
+class RtsSolver:
+    """Our own pass backwards."""
+
+    def smoothed(
+        self, windows: Sequence[FilteredTrack], wanted: Sequence[int], final: bool
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return means (K, A, D) and covariances (K, A, D, D) of the first records of each window."""
+        found = zip(smoothed_together(windows), wanted, strict=True)
+        return [(mean[:count], covariance[:count]) for (mean, covariance), count in found]
+
+    def leave(self, track_id: int, count: int) -> None:
+        """Do nothing: nothing is kept between windows."""
+
+    def end(self, track_id: int) -> None:
+        """Do nothing."""
+
+    def settle(self) -> None:
+        """Do nothing."""
+
+    def counts(self) -> dict[str, int]:
+        """Return nothing."""
+        return {}
+
+
+class Entry(NamedTuple):
+    """One update of one track: of `FilterRecord` and, where it is the last of its step, of `StepRecord`."""
+
+    t: float
+    F: FloatArray
+    predicted_mean: FloatArray
+    predicted_covariance: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+    sensor: int
+    real: float
+    used: int
+    confirmed: bool
+    missed: float
+    last_of_step: bool
+
+
+@dataclass
+class History:
+    """The updates of one living track that are not final.
+
+    Attributes:
+        track_id: identity.
+        called: in the rows.
+        missed: what had been missed by the last entry that was given out; below 0 before the first.
+        entries: the updates.
+    """
+
+    track_id: int
+    called: Called
+    missed: float = -1.0
+    entries: list[Entry] = field(default_factory=list)
+
+    def window(self) -> FilteredTrack:
+        """Return its entries as columns."""
+        e = self.entries
+        shape = e[0].covariance.shape
+        return FilteredTrack(
+            self.track_id,
+            np.array([one.t for one in e]),
+            np.stack([np.broadcast_to(one.F, shape) for one in e]),
+            np.stack([one.predicted_mean for one in e]),
+            np.stack([one.predicted_covariance for one in e]),
+            np.stack([one.mean for one in e]),
+            np.stack([one.covariance for one in e]),
+            np.array([one.sensor for one in e], dtype=np.int64),
+        )
+
+
+class Histories:
+    """Takes steps in, in order of time, and gives smoothed rows out.
+
+    Args:
+        lag_s: fixed lag (s); infinite for whole tracks.
+        existence: which rows are given.
+        told: how states are told.
+        solver: of the states; our own pass if None.
+    """
+
+    def __init__(self, lag_s: float, existence: Existence, told: Told, solver: Solver | None = None) -> None:
+        self._lag_s, self._existence, self._told = lag_s, existence, told
+        self._solver: Solver = RtsSolver() if solver is None else solver
+        self._living: list[History] = []
+        self._ended: list[tuple[History, GapCounts]] = []
+        self._rows: list[ModelRows] = []
+        self._gaps = gap_survival.no_gaps()
+        self._smoothed = 0
+
+    def counts(self) -> dict[str, int]:
+        """Return how many tracks have ended, and what the solver counts."""
+        return {"tracks": self._smoothed, **self._solver.counts()}
+
+    def take(self, record: StepRecord, called: Sequence[Called]) -> None:
+        """Take in a step; `called` is of its tracks (N,).
+
+        Raises:
+            ValueError: it is not the step behind the last one.
+        """
+        if record.begins_anew:
+            self.end_all(record.gaps)
+        ids = record.track_id.tolist()
+        if [one.track_id for one in self._living] != ids[: len(self._living)]:
+            raise ValueError("steps must be handed over once, and in order of time")
+        self._living += [History(k, Called(k)) for k in ids[len(self._living) :]]
+        for number, scan in enumerate(record.scans):
+            last = number == len(record.scans) - 1
+            for i in range(len(scan.track_id)):
+                self._living[i].entries.append(_entry(record, scan, i, last))
+        for history, name in zip(self._living, called, strict=True):
+            history.called = name
+        self._advance(record.t, record.gaps)
+        self._end(record.kept, record.gaps_after)
+        self._gaps = record.gaps_after
+
+    def end_all(self, gaps: GapCounts | None = None) -> None:
+        """End all tracks; gaps are those counted so far, if not those of the last step."""
+        self._end(np.zeros(len(self._living), dtype=np.bool_), self._gaps if gaps is None else gaps)
+
+    def preview(self) -> ModelRows:
+        """Return all rows that are not drained, those of living tracks as of now; these stay."""
+        self._smooth_ended()
+        wanted = [one for one in self._living if one.entries]
+        found = self._solver.smoothed(
+            [one.window() for one in wanted], [len(one.entries) for one in wanted], False
+        )
+        parts = [
+            self._rows_of(one, math.inf, self._gaps, states)[0]
+            for one, states in zip(wanted, found, strict=True)
+        ]
+        return joined([*self._rows, *parts])
+
+    def drain(self) -> ModelRows:
+        """Return, and forget, the rows that have become final."""
+        self._smooth_ended()
+        rows, self._rows = joined(self._rows), []
+        return rows
+
+    def finish(self) -> ModelRows:
+        """End all tracks and return all rows that are not drained."""
+        self.end_all()
+        return self.drain()
+
+    def settle(self) -> None:
+        """Forget what can be made again: what follows is as of one that was saved and loaded."""
+        self._smooth_ended()
+        self._solver.settle()
+
+    def state(self) -> dict[str, Any]:
+        """Return what `set_state` takes: plain data and arrays."""
+        self.settle()
+        return {
+            "gaps": np.stack(self._gaps),
+            "smoothed": self._smoothed,
+            "rows": list(joined(self._rows)),
+            "called": [tuple(one.called) for one in self._living],
+            "missed": np.array([one.missed for one in self._living]),
+            "track_id": np.array([one.track_id for one in self._living], dtype=np.int64),
+            "entries": [_columns(one.entries) for one in self._living],
+        }
+
+    def set_state(self, state: dict[str, Any]) -> None:
+        """Go on from what `state` returned.
+
+        Raises:
+            ValueError: it is not what histories can be in.
+        """
+        try:
+            missed, ids = state["missed"].tolist(), state["track_id"].tolist()
+            called = [Called(int(given), int(label), float(share)) for given, label, share in state["called"]]
+            entries = [_entries(one) for one in state["entries"]]
+            living = [
+                History(int(track), name, float(number), updates)
+                for track, name, number, updates in zip(ids, called, missed, entries, strict=True)
+            ]
+            rows = joined([tuple(state["rows"])])
+            gaps = GapCounts(*np.asarray(state["gaps"], dtype=np.float64))
+        except (KeyError, TypeError, AttributeError, IndexError) as error:
+            raise ValueError(f"its smoother's records are none ({error})") from None
+        if len({len(column) for column in rows}) != 1 or not all(np.isfinite(one).all() for one in rows):
+            raise ValueError("its smoothed rows are none")
+        self._living, self._rows, self._gaps = living, [rows], gaps
+        self._ended, self._smoothed = [], int(state["smoothed"])
+
+    def _advance(self, now: float, gaps: GapCounts) -> None:
+        """Give out what has become final while tracks live on."""
+        if not math.isfinite(self._lag_s):
+            return
+        ready = [
+            one
+            for one in self._living
+            if one.entries
+            and one.entries[0].t < now - (1.0 + _share_of(one)) * self._lag_s
+            and self._is_decided(one)
+        ]
+        if not ready:
+            return
+        counts = [sum(entry.t <= now - self._lag_s for entry in one.entries) for one in ready]
+        found = self._solver.smoothed([one.window() for one in ready], counts, True)
+        for one, states in zip(ready, found, strict=True):
+            rows, count, missed = self._rows_of(one, now - self._lag_s, gaps, states)
+            self._rows.append(rows)
+            one.missed = missed
+            del one.entries[:count]
+            self._solver.leave(one.track_id, count)
+
+    def _is_decided(self, history: History) -> bool:
+        """Return whether rows of a living track can be given: what it is may still turn out, or has."""
+        rule = self._existence
+        return not rule.of_any_time or any(one.real > rule.constants.report for one in history.entries)
+
+    def _end(self, kept: BoolArray, gaps: GapCounts) -> None:
+        """Have tracks wait to be smoothed that end, and forget them."""
+        ended = [one for one, stays in zip(self._living, kept.tolist(), strict=True) if not stays]
+        if not ended:
+            return
+        self._smoothed += len(ended)
+        self._living = [one for one, stays in zip(self._living, kept.tolist(), strict=True) if stays]
+        self._ended += [(one, gaps) for one in ended]
+        if len(self._ended) > _MOST_WAITING:
+            self._smooth_ended()
+
+    def _smooth_ended(self) -> None:
+        whole = [(one, gaps) for one, gaps in self._ended if one.entries]
+        counts = [len(one.entries) for one, _ in whole]
+        found = self._solver.smoothed([one.window() for one, _ in whole], counts, True)
+        for (one, gaps), states in zip(whole, found, strict=True):
+            self._rows.append(self._rows_of(one, math.inf, gaps, states)[0])
+        for one, _ in self._ended:
+            self._solver.end(one.track_id)
+        self._ended = []
+
+    def _rows_of(
+        self, history: History, until: float, gaps: GapCounts, states: tuple[FloatArray, FloatArray]
+    ) -> tuple[ModelRows, int, float]:
+        """Return a window's rows until a time (s), how many entries these are, and what was missed by the last of them.
+
+        A row's existence is the track's posterior at that time, or where it turned out to be real for sure,
+        what it turned out to be. (Less than sure tells nothing of the past: what began as a second box is
+        often taken over by an object.) While nobody sees the track, it counts times the probability that a
+        gap as long as it is to the nearer one of its ends ends well.
+        """
+        c, e = self._existence.constants, history.entries
+        t = np.array([one.t for one in e])
+        real, missed = np.array([one.real for one in e]), np.array([one.missed for one in e])
+        used = np.array([one.used for one in e], dtype=np.int64)
+        confirmed, last = np.array([one.confirmed for one in e]), np.array([one.last_of_step for one in e])
+        same = np.flatnonzero(t[1:] == t[:-1])
+        for k in same.tolist():  # of one time the last one tells what all of them found
+            used[k + 1] |= used[k]
+            confirmed[k + 1] |= confirmed[k]
+            missed[k + 1] *= not confirmed[k + 1]
+        seen = np.flatnonzero(confirmed & last)
+        final = float(real[seen[-1]]) if len(seen) else 0.0
+        if self._existence.of_any_time:
+            final = float(real.max())
+        count = int(np.searchsorted(t, until, side="right"))
+        gap, before = _gaps(confirmed, missed, last), max(history.missed, 0.0)
+        told = np.flatnonzero(last[:count])
+        nearer = np.minimum(missed[told], gap[told] - np.concatenate([[before], missed[told]])[:-1])
+        given = told <= (seen[-1] if len(seen) else -1)
+        given &= ~np.isin(told, same)  # a later step of the same time tells more
+        rows = told[given]
+        is_real = np.maximum(real[rows], final) if final > c.sure else real[rows]
+        is_real = is_real * gap_survival.survival(gaps, nearer[given], c)
+        shown = is_real > c.report
+        rows, is_real = rows[shown], is_real[shown]
+        table = rows_of(
+            t[rows],
+            [history.called] * len(rows),
+            (states[0][rows], states[1][rows]),
+            is_real,
+            used[rows],
+            self._told,
+        )
+        return table, count, float(missed[told[-1]]) if len(told) else before
+
+
+def _gaps(confirmed: BoolArray, missed: FloatArray, last: BoolArray) -> FloatArray:
+    """Return how long (K,) the whole gap is that each update lies in, in expected detections; 0 in none."""
+    out, whole = np.zeros(len(missed)), 0.0
+    for k in np.flatnonzero(last)[::-1].tolist():
+        whole = 0.0 if confirmed[k] else max(whole, float(missed[k]))
+        out[k] = whole
+    return out
+
+
+def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> Entry:
+    """Return the update of one track in one scan; what is told of a step stands in its last scan."""
+    return Entry(
+        t=record.t,
+        F=scan.F[row],
+        predicted_mean=scan.predicted_mean[row],
+        predicted_covariance=scan.predicted_covariance[row],
+        mean=scan.mean[row],
+        covariance=scan.covariance[row],
+        sensor=int(scan.sensor[row]),
+        real=float(record.real[row]) if last else 0.0,
+        used=int(record.used[row]) if last else 0,
+        confirmed=last and bool(record.confirmed[row]),
+        missed=float(record.missed[row]) if last else 0.0,
+        last_of_step=last,
+    )
+
+
+def _columns(entries: Sequence[Entry]) -> list[FloatArray]:
+    """Return updates as arrays (K, ...), one for each attribute."""
+    return (
+        [
+            np.stack([np.asarray(one[k], dtype=np.float64) for one in entries])
+            for k in range(len(Entry._fields))
+        ]
+        if entries
+        else []
+    )
+
+
+def _entries(columns: Sequence[FloatArray]) -> list[Entry]:
+    """Return what `_columns` made arrays of.
+
+    Raises:
+        ValueError: they are no updates.
+    """
+    if not len(columns):
+        return []
+    if len({len(one) for one in columns}) != 1 or not all(np.isfinite(one).all() for one in columns):
+        raise ValueError("its updates are none")
+    made = []
+    for t, F, before, before_cov, mean, covariance, *said in zip(*columns, strict=True):
+        sensor, real, used, confirmed, missed, last = (float(one) for one in said)
+        size = mean.shape[-1] if mean.ndim == 2 else -1
+        square = (len(mean), size, size)
+        shapes = {before_cov.shape, covariance.shape}
+        if before.shape != mean.shape or F.shape != (1, size, size) or shapes != {square}:
+            raise ValueError("its updates are none")
+        states = F, before, before_cov, mean, covariance
+        told = int(sensor), real, int(used), bool(confirmed), missed, bool(last)
+        made.append(Entry(float(t), *states, *told))
+    return made
+
+
+def _share_of(history: History) -> float:
+    """Return which share of the second lag a track waits for: first as its identity says, then all of it."""
+    if history.missed >= 0.0:
+        return 1.0  # its first rows are out
+    turns = _GOLDEN * (history.track_id & _LOW_BITS)
+    return turns - math.floor(turns)
