@@ -341,7 +341,7 @@ class Histories:
     def _rows_of(
         self, history: History, until: float, gaps: GapCounts, states: tuple[FloatArray, FloatArray]
     ) -> tuple[ModelRows, int, float]:
-        """Return a window's rows until a time (s), how many entries these are, and what was missed by the last of them.
+        """Return a window's rows until a time (s), how many entries these are, and what the last one missed.
 
         A row's existence is the track's posterior at that time, or where it turned out to be real for sure,
         what it turned out to be. (Less than sure tells nothing of the past: what began as a second box is
@@ -441,9 +441,22 @@ def _entries(columns: Sequence[FloatArray]) -> list[Entry]:
         shapes = {before_cov.shape, covariance.shape}
         if before.shape != mean.shape or F.shape != (1, size, size) or shapes != {square}:
             raise ValueError("its updates are none")
-        states = F, before, before_cov, mean, covariance
-        told = int(sensor), real, int(used), bool(confirmed), missed, bool(last)
-        made.append(Entry(float(t), *states, *told))
+        made.append(
+            Entry(
+                t=float(t),
+                F=F,
+                predicted_mean=before,
+                predicted_covariance=before_cov,
+                mean=mean,
+                covariance=covariance,
+                sensor=int(sensor),
+                real=real,
+                used=int(used),
+                confirmed=bool(confirmed),
+                missed=missed,
+                last_of_step=bool(last),
+            )
+        )
     return made
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +16,12 @@ from jeat_graph.cli.main import main
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.core import tracking as compiled
 from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.smoothers.histories import Existence, Histories
+from jeat_graph.smoothers.rows import Called, in_order
 from jeat_graph.tracking.core_model import CoreModel
 from jeat_graph.tracking.engine import Looked
 from jeat_graph.tracking.model_tracker import ModelTracker
+from jeat_graph.tracking.one_model import told_of
 from jeat_graph.tracking.reference_model import ReferenceModel
 
 #: Where doubles of one order of operations differ from those of another, by condition.
@@ -132,6 +136,29 @@ def test_whole_tracks_are_smoothed_as_by_the_reference(seed, motions):
     # A pass backwards solves with covariances whose condition is 1e10 and more after long gaps, and each
     # subtracts what is nearly equal in an order of its own: of a variance three digits are sure.
     assert_alike(ours, theirs, "smoothed", atol=1e-3)
+
+
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 10**6), motions=st.booleans(), lag=st.sampled_from([math.inf, 0.4, 2.0]))
+def test_the_cores_smoother_is_the_one_in_numpy_over_its_records(seed, motions, lag):
+    smoother = "engine=full" if math.isinf(lag) else f"engine=fixed-lag lag_s={lag}"
+    core, recorder = models(smoother, True)[0], models(smoother, True)[0]
+    ours = Histories(lag, Existence(ModelConstants()), told_of(ModelConstants()))
+    for _ in range(2):
+        declare(core)
+        declare(recorder)
+    for scan in drawn_stream(seed, 2, 30, motions):
+        core.take(looked(*scan))
+        core.hand_over()
+        recorder.take(looked(*scan))
+        record = recorder.step_record(recorder.record())
+        ours.take(record, [Called(track) for track in record.track_id.tolist()])
+    found, wanted = in_order(ours.finish()), in_order(core.finish())
+    for k in (0, 1, 5, 6, 7):
+        np.testing.assert_array_equal(found[k], wanted[k])
+    np.testing.assert_allclose((found[2] - wanted[2]) / np.sqrt(wanted[3]), 0.0, atol=1e-9)
+    np.testing.assert_allclose(found[3], wanted[3], rtol=1e-9)
+    np.testing.assert_allclose(found[4], wanted[4], rtol=1e-12)
 
 
 def sorted_rows(rows):
