@@ -19,7 +19,7 @@ from jeat_graph.filters import gap_survival
 from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.filtered_track import FilteredTrack, smoothed_together
-from jeat_graph.smoothers.rows import Called, ModelRows, Told, joined, rows_of
+from jeat_graph.smoothers.rows import Called, ModelRows, RowOutput, joined, rows_of
 from jeat_graph.smoothers.state_rts import FilterRecord
 
 # Tracks that have ended wait until so many are smoothed together.
@@ -127,7 +127,7 @@ class RtsSolver:
         return {}
 
 
-class Entry(NamedTuple):
+class TrackUpdate(NamedTuple):
     """One update of one track: of `FilterRecord` and, where it is the last of its step, of `StepRecord`."""
 
     t: float
@@ -158,7 +158,7 @@ class History:
     track_id: int
     called: Called
     missed: float = -1.0
-    entries: list[Entry] = field(default_factory=list)
+    entries: list[TrackUpdate] = field(default_factory=list)
 
     def window(self) -> FilteredTrack:
         """Return its entries as columns."""
@@ -186,7 +186,9 @@ class Histories:
         solver: of the states; our own pass if None.
     """
 
-    def __init__(self, lag_s: float, existence: Existence, told: Told, solver: Solver | None = None) -> None:
+    def __init__(
+        self, lag_s: float, existence: Existence, told: RowOutput, solver: Solver | None = None
+    ) -> None:
         self._lag_s, self._existence, self._told = lag_s, existence, told
         self._solver: Solver = RtsSolver() if solver is None else solver
         self._living: list[History] = []
@@ -393,9 +395,9 @@ def _gaps(confirmed: BoolArray, missed: FloatArray, last: BoolArray) -> FloatArr
     return out
 
 
-def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> Entry:
+def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> TrackUpdate:
     """Return the update of one track in one scan; what is told of a step stands in its last scan."""
-    return Entry(
+    return TrackUpdate(
         t=record.t,
         F=scan.F[row],
         predicted_mean=scan.predicted_mean[row],
@@ -411,19 +413,19 @@ def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> Entr
     )
 
 
-def _columns(entries: Sequence[Entry]) -> list[FloatArray]:
+def _columns(entries: Sequence[TrackUpdate]) -> list[FloatArray]:
     """Return updates as arrays (K, ...), one for each attribute."""
     return (
         [
             np.stack([np.asarray(one[k], dtype=np.float64) for one in entries])
-            for k in range(len(Entry._fields))
+            for k in range(len(TrackUpdate._fields))
         ]
         if entries
         else []
     )
 
 
-def _entries(columns: Sequence[FloatArray]) -> list[Entry]:
+def _entries(columns: Sequence[FloatArray]) -> list[TrackUpdate]:
     """Return what `_columns` made arrays of.
 
     Raises:
@@ -442,7 +444,7 @@ def _entries(columns: Sequence[FloatArray]) -> list[Entry]:
         if before.shape != mean.shape or F.shape != (1, size, size) or shapes != {square}:
             raise ValueError("its updates are none")
         made.append(
-            Entry(
+            TrackUpdate(
                 t=float(t),
                 F=F,
                 predicted_mean=before,

@@ -18,7 +18,7 @@ ModelRows: TypeAlias = tuple[
 ]
 
 
-class Told(NamedTuple):
+class RowOutput(NamedTuple):
     """How what tables tell follows from the states of an engine.
 
     Attributes:
@@ -44,7 +44,7 @@ def rows_of(
     states: tuple[FloatArray, FloatArray],
     real: FloatArray,
     used: IntArray,
-    told: Told,
+    told: RowOutput,
 ) -> ModelRows:
     """Return rows (N,).
 

@@ -20,7 +20,7 @@ from jeat_graph.filters.score_calibration import logit
 from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import ModelRows
 from jeat_graph.smoothers.state_rts import FilterRecord
-from jeat_graph.tracking.engine import Looked, Moment, Recorded
+from jeat_graph.tracking.engine import Moment, Recorded, StepInput
 from jeat_graph.tracking.one_model import Learnt, OneModel, even_logit_of
 from jeat_graph.tracking.record_smoothing import by_gtsam, lag_of
 
@@ -51,7 +51,7 @@ class CoreModel(OneModel):
         """Add a sensor that has not looked yet."""
         self._model.declare_sensor(even_logit_of(said))
 
-    def take(self, looked: Looked) -> None:
+    def take(self, looked: StepInput) -> None:
         """Take in the scans of one time."""
         sides = np.concatenate([looked.boxes[:, :2], looked.boxes[:, :2] + looked.boxes[:, 2:]], axis=1)
         alike = None if looked.alike is None else np.ascontiguousarray(looked.alike)

@@ -21,7 +21,7 @@ from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.sensor_state import SensorState
 
 
-class Looked(NamedTuple):
+class StepInput(NamedTuple):
     """What sensors saw at one time, M boxes of K sensors.
 
     Attributes:
@@ -45,7 +45,7 @@ class Looked(NamedTuple):
 
 
 class StepBoxes(NamedTuple):
-    """The boxes of the last step, in the order of `Engine.takers`.
+    """The boxes of the last step, in the order of `TrackEngine.takers`.
 
     Attributes:
         t: its time (s).
@@ -80,7 +80,7 @@ class Recorded(Protocol):
         """Return the identities (N,) of the tracks after the step, before any ended."""
 
 
-class Engine(Protocol):
+class TrackEngine(Protocol):
     """A model with its tracks: steps in, rows out. Arrays that it returns are not written to later."""
 
     @property
@@ -106,7 +106,7 @@ class Engine(Protocol):
     def declare_sensor(self, name: str, said: SensorConfig) -> None:
         """Add a sensor that has not looked yet, with what the user says of it."""
 
-    def take(self, looked: Looked) -> None:
+    def take(self, looked: StepInput) -> None:
         """Take in the scans of one time, which is not before that of the last step."""
 
     def begin_anew(self, t: float) -> None:

@@ -6,10 +6,10 @@ from jeat_graph.config.schema import Config
 from jeat_graph.config.tracker import ENGINES
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.tracking.engine import Engine
+from jeat_graph.tracking.engine import TrackEngine
 
 
-def make_engine(config: Config, constants: ModelConstants | None = None) -> Engine:
+def make_engine(config: Config, constants: ModelConstants | None = None) -> TrackEngine:
     """Return a new engine, the one that `tracker.engine` names.
 
     Args:

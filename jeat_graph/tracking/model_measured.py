@@ -31,7 +31,7 @@ def diagnostics_of(
         told: the boxes.
         takers: (M,) tracks that took them.
         living: (N,) tracks after the step, ascending.
-        fit: of `Engine.fit`.
+        fit: of `TrackEngine.fit`.
         sensors: names of the sensors.
     """
     nis, scale, real = fit
@@ -59,7 +59,7 @@ def records_of(
     Args:
         told: the boxes; sensors as the caller counts them.
         takers: (M,) tracks that took them.
-        fit: of `Engine.fit`.
+        fit: of `TrackEngine.fit`.
         q: process noise of the scene.
         c: constants.
     """

@@ -13,7 +13,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage
-from jeat_graph.tracking.engine import Engine, Moment, StepBoxes
+from jeat_graph.tracking.engine import Moment, StepBoxes, TrackEngine
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothed_instants import SmoothedInstants
 
@@ -47,7 +47,7 @@ class SavedModel:
 
     if TYPE_CHECKING:
         config: Config
-        _model: Engine
+        _model: TrackEngine
         _diagnostics: bool
         _finished: bool
         _watch: InputWatch

@@ -1,4 +1,4 @@
-"""The tracker over an engine (`engine.Engine`): checks what comes, steps, and makes tables of the rows."""
+"""The tracker over an engine (`engine.TrackEngine`): checks what comes, steps, makes tables of rows."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import ModelRows, in_order
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names, number_classes
-from jeat_graph.tracking.engine import Engine, Looked, Recorded, StepBoxes
+from jeat_graph.tracking.engine import Recorded, StepBoxes, StepInput, TrackEngine
 from jeat_graph.tracking.engines import make_engine
 from jeat_graph.tracking.first_sight import wider
 from jeat_graph.tracking.hypotheses import Hypotheses
@@ -115,7 +115,7 @@ class ModelTracker(Updates, SavedModel):
         self.logs_takers = True
         self._diagnostics = diagnostics
         self._smooths = config.smoother.engine != "none"
-        self._model: Engine = make_engine(config, constants)
+        self._model: TrackEngine = make_engine(config, constants)
         if diagnostics and not self._model.has_fit:
             raise JeatGraphError(f"engine {self._model.name} has no diagnostics")
         self._common = CommonPicture.of(config)
@@ -231,7 +231,7 @@ class ModelTracker(Updates, SavedModel):
         numbers = np.bincount(sensor, minlength=len(self._looked))[looking].astype(np.int64)
         compared = None if embeddings is None else self._compare(embeddings, sensor)
         alike = None if compared is None else compared.log_ratio[:, order]
-        self._model.take(Looked(t, looking, numbers, boxes, scores, alike, _surest_motion(batch)))
+        self._model.take(StepInput(t, looking, numbers, boxes, scores, alike, _surest_motion(batch)))
         self._order, self._causal = order, None
         if self._diagnostics:
             self._boxes = StepBoxes(t, sensor[order], boxes)

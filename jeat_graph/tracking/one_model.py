@@ -18,7 +18,7 @@ from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.object_probability import SensorBelief
 from jeat_graph.filters.score_calibration import logit
 from jeat_graph.smoothers.histories import Existence
-from jeat_graph.smoothers.rows import ModelRows, Told
+from jeat_graph.smoothers.rows import ModelRows, RowOutput
 from jeat_graph.tracking.engine import StepBoxes
 from jeat_graph.tracking.hypotheses import Hypotheses, hypotheses_of
 from jeat_graph.tracking.model_measured import records_of
@@ -53,9 +53,9 @@ class Learnt(NamedTuple):
     process_noise: singer.ProcessNoise
 
 
-def told_of(c: ModelConstants) -> Told:
+def told_of(c: ModelConstants) -> RowOutput:
     """Return how tables tell the states of the model."""
-    return Told(partial(singer.told_motion, c=c), partial(singer.told_covariance, c=c))
+    return RowOutput(partial(singer.told_motion, c=c), partial(singer.told_covariance, c=c))
 
 
 def even_logit_of(said: SensorConfig) -> float:
@@ -72,7 +72,7 @@ class OneModel(SmoothsRecords):
         by_records: whether its records are smoothed here.
     """
 
-    #: What an engine of the model has; see `Engine`.
+    #: What an engine of the model has; see `TrackEngine`.
     has_fit = True
     weighs = True
     compares_looks = True
@@ -104,10 +104,10 @@ class OneModel(SmoothsRecords):
 
     @abstractmethod
     def fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return how well the boxes of the last step fitted; see `Engine.fit`."""
+        """Return how well the boxes of the last step fitted; see `TrackEngine.fit`."""
 
     def predicted(self, t: float) -> tuple[ModelRows, FloatArray]:
-        """Return the reported tracks at a later time; see `Engine.predicted`."""
+        """Return the reported tracks at a later time; see `TrackEngine.predicted`."""
         learnt = self.learnt()
         noise = learnt.process_noise, learnt.log_scene_variance
         return predicted(self.rows(), self.states(), t, noise, self.constants)
@@ -133,9 +133,9 @@ class OneModel(SmoothsRecords):
         ]
 
     def measurements(self, told: StepBoxes) -> RecordArray:
-        """Return the boxes of the last step as the filter weighed them; see `Engine.measurements`."""
+        """Return the boxes of the last step as the filter weighed them; see `TrackEngine.measurements`."""
         return records_of(told, self.takers(), self.fit(), self.learnt().process_noise, self.constants)
 
     def hypotheses(self, t: float, shown: IntArray, sensors: tuple[str, ...]) -> Hypotheses:
-        """Return what the living tracks are taken for, and why; see `Engine.hypotheses`."""
+        """Return what the living tracks are taken for, and why; see `TrackEngine.hypotheses`."""
         return hypotheses_of(self.tracks(), self.learnt().belief, self.constants, t, shown, sensors)

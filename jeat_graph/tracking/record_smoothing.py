@@ -10,7 +10,7 @@ from jeat_graph.config.smoothing import LAGGED
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.smoothers.histories import Existence, Histories, RtsSolver, Solver, StepRecord
-from jeat_graph.smoothers.rows import Called, ModelRows, Told
+from jeat_graph.smoothers.rows import Called, ModelRows, RowOutput
 from jeat_graph.tracking.engine import Recorded
 
 
@@ -22,7 +22,7 @@ def lag_of(config: Config) -> float:
     return config.smoother.lag_s if engine in LAGGED else math.inf
 
 
-def histories_of(config: Config, existence: Existence, told: Told) -> Histories | None:
+def histories_of(config: Config, existence: Existence, told: RowOutput) -> Histories | None:
     """Return what smooths as a configuration asks for; None where it wants no smoother."""
     lag_s = lag_of(config)
     return None if lag_s < 0.0 else Histories(lag_s, existence, told, _solver_of(config))
@@ -66,7 +66,7 @@ class SmoothsRecords(ABC):
         label: IntArray | None = None,
         share: FloatArray | None = None,
     ) -> None:
-        """Tell the smoother of a step; see `Engine.hand_over`."""
+        """Tell the smoother of a step; see `TrackEngine.hand_over`."""
         if self._histories is None:
             return
         told = self.step_record(self.record() if record is None else record)

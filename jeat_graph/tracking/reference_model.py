@@ -19,7 +19,7 @@ from jeat_graph.filters.score_calibration import logit
 from jeat_graph.filters.singer import STATES
 from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import Called, ModelRows, joined, rows_of
-from jeat_graph.tracking.engine import Looked, Moment, Recorded, lacking
+from jeat_graph.tracking.engine import Moment, Recorded, StepInput, lacking
 from jeat_graph.tracking.one_model import Learnt, OneModel, even_logit_of, told_of
 from jeat_graph.tracking.reference import step
 from jeat_graph.tracking.reference_life import begin_anew
@@ -77,7 +77,7 @@ class ReferenceModel(OneModel):
         """Add a sensor that has not looked yet."""
         declare_sensor(self._state, self.constants, even_logit_of(said))
 
-    def take(self, looked: Looked) -> None:
+    def take(self, looked: StepInput) -> None:
         """Take in the scans of one time."""
         t, alike, motion = looked.t, looked.alike, looked.motion
         sides = np.concatenate([looked.boxes[:, :2], looked.boxes[:, :2] + looked.boxes[:, 2:]], axis=1)

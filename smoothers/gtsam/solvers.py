@@ -115,7 +115,7 @@ class GtsamLag(GtsamFull):
 
 
 @dataclass
-class _Window:
+class _InsideGtsam:
     """States inside GTSAM.
 
     Attributes:
@@ -149,7 +149,7 @@ class LagChain:
         params.enableRelinearization = False
         self._smoother: Any = gtsam.IncrementalFixedLagSmoother(_LAG, params)
         self._leaving: list[int] = []
-        self._window: _Window | None = None
+        self._window: _InsideGtsam | None = None
 
     def extend(self, window: FilteredTrack) -> None:
         """Take in the records of a window that are new: the others are its first ones."""
@@ -182,7 +182,7 @@ class LagChain:
             self._smoother.update(factors, _zeros(new, size), stamps)
         except _GTSAM_ERRORS as error:
             raise GtsamError(str(error)) from error
-        self._window = _Window(0 if before is None else before.first, state, reference)
+        self._window = _InsideGtsam(0 if before is None else before.first, state, reference)
 
     def states(self, wanted: int) -> States:
         """Return means (K, A, D) and covariances (K, A, D, D) of the window's first records, so many."""
@@ -211,7 +211,7 @@ class LagChain:
         gone = first - window.first
         self._leaving += range(window.first, first)
         kept = Reference(window.reference.mean[gone:], window.reference.root[gone:])
-        self._window = _Window(first, state, kept)
+        self._window = _InsideGtsam(first, state, kept)
 
 
 def solve_whole(window: FilteredTrack) -> States:

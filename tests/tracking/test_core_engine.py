@@ -19,7 +19,7 @@ from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.histories import Existence, Histories
 from jeat_graph.smoothers.rows import Called, in_order
 from jeat_graph.tracking.core_model import CoreModel
-from jeat_graph.tracking.engine import Looked
+from jeat_graph.tracking.engine import StepInput
 from jeat_graph.tracking.model_tracker import ModelTracker
 from jeat_graph.tracking.one_model import told_of
 from jeat_graph.tracking.reference_model import ReferenceModel
@@ -82,7 +82,7 @@ def models(smoother, known, **changes):
 def looked(t, sensors, numbers, sides, logits, alike=None, motion=None):
     """Return a drawn scan as engines take it."""
     boxes = np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], axis=1)
-    return Looked(t, sensors, numbers, boxes, 1.0 / (1.0 + np.exp(-logits)), alike, motion)
+    return StepInput(t, sensors, numbers, boxes, 1.0 / (1.0 + np.exp(-logits)), alike, motion)
 
 
 def declare(model):

@@ -1,4 +1,4 @@
-"""What every engine has, and how it says what it has not: the contract of `engine.Engine`."""
+"""What every engine has, and how it says what it has not: the contract of `engine.TrackEngine`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jeat_graph import Tracker, load_config
 from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.histories import StepRecord
-from jeat_graph.tracking.engine import Engine
+from jeat_graph.tracking.engine import TrackEngine
 from jeat_graph.tracking.engines import make_engine
 from jeat_graph.tracking.model_tracker import ModelTracker
 
@@ -43,7 +43,7 @@ def tracked(engine, *settings, **options):
 @every_engine
 def test_an_engine_has_all_methods_of_the_contract_with_their_arguments(engine):
     made = make_engine(configured(engine))
-    for name, wanted in inspect.getmembers(Engine):
+    for name, wanted in inspect.getmembers(TrackEngine):
         if name.startswith("_"):
             continue
         assert hasattr(made, name), f"{engine} lacks {name}"

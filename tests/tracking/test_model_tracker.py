@@ -12,7 +12,7 @@ from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError, TimeO
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.score_calibration import logit
 from jeat_graph.tracking.core_model import CoreModel
-from jeat_graph.tracking.engine import Looked
+from jeat_graph.tracking.engine import StepInput
 from jeat_graph.tracking.model_tracker import ModelTracker
 from jeat_graph.tracking.reference_model import ReferenceModel
 
@@ -191,7 +191,7 @@ def test_looks_decide_who_takes_a_box_and_not_whether_there_is_an_object():
         for k in range(30):
             boxes = np.array([[100.0 + k, 100.0, 40.0, 30.0], [400.0, 400.0, 40.0, 40.0]])
             alike = np.full((model.size(), 2), -5.0)  # nobody looks like himself, nor like the other
-            model.take(Looked(0.05 * k, 0 * one, 2 * one, boxes, np.full(2, 0.88), alike))
+            model.take(StepInput(0.05 * k, 0 * one, 2 * one, boxes, np.full(2, 0.88), alike))
         answers.append((model.rows()[1].tolist(), model.born(), model.rows()[4]))
     assert answers[0][0] == answers[1][0] == [1, 2]
     assert answers[0][1] == answers[1][1] == 2

@@ -15,8 +15,8 @@ from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.filters import gap_survival
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.histories import Existence, StepRecord
-from jeat_graph.smoothers.rows import TOLD, Called, ModelRows, Told, rows_of
-from jeat_graph.tracking.engine import Looked, Moment, Recorded, StepBoxes, lacking
+from jeat_graph.smoothers.rows import TOLD, Called, ModelRows, RowOutput, rows_of
+from jeat_graph.tracking.engine import Moment, Recorded, StepBoxes, StepInput, lacking
 from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.paper.kalman import predict
 from jeat_graph.tracking.paper.state import MOST_LOG_SIZE, Found, PaperTracks, together
@@ -89,7 +89,7 @@ class PaperModel(SmoothsRecords):
             last_look_s=np.append(now.last_look_s, math.nan),
         )
 
-    def take(self, looked: Looked) -> None:
+    def take(self, looked: StepInput) -> None:
         """Take in the scans of one time."""
         now, t = self._now, looked.t
         dt = 0.0 if now.t is None else t - now.t
@@ -220,7 +220,7 @@ class PaperModel(SmoothsRecords):
     def _reported(self) -> PaperTracks:
         return self._now.tracks.take(self._now.tracks.confirmed)
 
-    def _found(self, looked: Looked) -> Found:
+    def _found(self, looked: StepInput) -> Found:
         """Return the detections of a step with their noise R_base g(p), g = 1 / max(p, floor).
 
         Sensors are numbered as they were met; births are by their names, as in a configuration.
@@ -248,7 +248,7 @@ def _told_mean(mean: FloatArray) -> FloatArray:
     return out
 
 
-_TOLD = Told(_told_mean, lambda _, covariance: covariance)
+_TOLD = RowOutput(_told_mean, lambda _, covariance: covariance)
 
 
 def _rows(tracks: PaperTracks, t: float | None) -> tuple[ModelRows, FloatArray]:
