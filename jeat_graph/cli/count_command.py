@@ -15,6 +15,7 @@ import numpy.typing as npt
 from jeat_graph.cli.count_output import (
     PublicationOptions,
     clock_s,
+    later_s,
     rounded,
     station_columns,
     with_clock,
@@ -105,19 +106,20 @@ def run(args: argparse.Namespace) -> int:
     names = [line.name for line in lines] + [zone.name for zone in zones]
     _check_places(args, len(lines), len(names))
     publication = _publication(args)
-    later_s = clock_s(args.begin)
+    clock_s(args.begin)  # refused before anything is read
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
     table = read_trajectories(tables[kind], **tables_read(args))
     first, last = recording_span(Path(args.source), tables[kind], table)
+    later = later_s(args.begin, first, args.source)
     if args.classes is not None:
         table = table.of_class(*args.classes, final=True)
     known = table.final_classes()
-    possible = [replace(c, t=c.t + later_s) for p in (*lines, *zones) for c in passages(table, p, known)]
+    possible = [replace(c, t=c.t + later) for p in (*lines, *zones) for c in passages(table, p, known)]
     found = [c for c in possible if c.counted]
     named = {line.name for line in lines}
-    at_lines = [replace(c, t=c.t - later_s) for c in found if c.line in named]
-    span = first + later_s, last + later_s
+    at_lines = [replace(c, t=c.t - later) for c in found if c.line in named]
+    span = first + later, last + later
     edges = _edges(args.interval, span, possible)
     counts = counting.count(
         possible,
@@ -131,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
     if args.od:
         _write_od(found, edges, names, args)
     if args.stations or publication is not None:
-        records = _stations(table, lines, at_lines, edges, span, later_s, args.road)
+        records = _stations(table, lines, at_lines, edges, span, later, args.road)
         if args.stations:
             write_columns(with_clock(station_columns(records), args.begin), args.stations)
         if publication is not None:

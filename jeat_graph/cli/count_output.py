@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from jeat_graph.data.errors import ConfigError
+from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.eval.stations import StationRecord
 from jeat_graph.io.tables.rounding import round_decimals
 
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 _PUBLISHER = re.compile(r"[A-Za-z]{2}:\S.*")
 Columns = dict[str, npt.NDArray[Any]]
 _CROSSINGS = "crossings.csv"
+#: Times from here on (1973) are those of a clock: no recording lasts so long.
+_SINCE_1970_S = 1e8
+#: A recording that begins so near to `--begin` begins there (s).
+_SAME_BEGIN_S = 1.0
 #: Columns of times (s) and of the same times on the clock.
 _CLOCKS = {"t": "time", "t_from": "begin", "t_to": "end", "t_start": "begin", "t_end": "end"}
 
@@ -36,6 +40,27 @@ def clock_s(begin: str | None) -> float:
         ConfigError: no date and time.
     """
     return 0.0 if begin is None else _date(begin).timestamp()
+
+
+def later_s(begin: str | None, first_s: float, source: str) -> float:
+    """Return how much later (s) the clock is than a recording's times; 0 where these are dates themselves.
+
+    Args:
+        begin: date and time of the recording's time 0, or None.
+        first_s: first time of the recording.
+        source: what was recorded, for messages.
+
+    Raises:
+        ConfigError: no date and time.
+        DataError: the recording's own times are dates, and begin at another one.
+    """
+    at = clock_s(begin)
+    if begin is None or first_s < _SINCE_1970_S:
+        return at
+    if abs(at - first_s) > _SAME_BEGIN_S:
+        own = datetime.fromtimestamp(first_s, _date(begin).tzinfo).isoformat(timespec="seconds")
+        raise DataError(f"has dates of its own, from {own} on: --begin {begin} contradicts them", source)
+    return 0.0
 
 
 def _date(begin: str) -> datetime:

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from jeat_graph.cli.count_output import clock_s, with_clock
+from jeat_graph.cli.count_output import clock_s, later_s, with_clock
 from jeat_graph.cli.options import add_counting, frames_read
 from jeat_graph.cli.terminal import say
 from jeat_graph.config.argument_types import positive
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.traffic import SummaryConfig
     from jeat_graph.road.writing import write_road
 
-    later_s = clock_s(args.begin)
+    clock_s(args.begin)  # refused before anything is read
     out = Path(args.out)
     check_folder(out)
     camera = read_camera(args.camera)
@@ -134,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
         result = with_own_classes(result, boxes.final_classes())
         result, agreements = with_unplaced(result, boxes, marks.lines)
         notes = agreement_notes(agreements)
-    traffic = SummaryConfig(begin_s=later_s)
+    traffic = SummaryConfig(begin_s=later_s(args.begin, span_s[0], args.source))
     if args.interval is not None:
         traffic = replace(traffic, interval_s=args.interval)
     name = Path(args.source).name or str(args.source)

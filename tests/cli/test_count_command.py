@@ -303,3 +303,34 @@ def test_too_few_places_are_refused_before_anything_is_read_or_written(tmp_path,
     said = fails("count", "no-such-run", *needs, "table.csv", "--out", "c.csv", "--crossings", "x.csv")
     assert "no-such-run" not in said
     assert list(tmp_path.iterdir()) == []
+
+
+def dated(tmp_path):
+    """A vehicle that passes x = 260 px on the first of May, by dates with a zone."""
+    rows = [f"2026-05-01T08:00:{k / 10:06.3f}+02:00,1,{200 + 15 * k},300,80,50\n" for k in range(20)]
+    path = tmp_path / "dated.csv"
+    path.write_text("t,track_id,left,top,width,height\n" + "".join(rows))
+    return path
+
+
+def test_dates_of_a_table_are_its_clock_and_begin_gives_the_zone(tmp_path):
+    """Not the sum of both, in the year 2082."""
+    line = ["--line", "260,0,260,720", "--interval", "60", "--out", str(tmp_path / "n.csv")]
+    for begin, hour in (("2026-05-01T08:00:00+02:00", "08"), ("2026-05-01T06:00:00Z", "06")):
+        assert main(["count", str(dated(tmp_path)), *line, "--begin", begin]) == 0
+        found = pd.read_csv(tmp_path / "n.csv")
+        assert found.begin[0].startswith(f"2026-05-01T{hour}:00:00")
+        assert found["count"].tolist() == [1]
+
+
+def test_another_begin_than_the_table_has_is_refused(tmp_path, capsys):
+    command = [
+        "count",
+        str(dated(tmp_path)),
+        "--line",
+        "260,0,260,720",
+        "--begin",
+        "2026-05-02T08:00:00+02:00",
+    ]
+    assert main(command) == 2
+    assert "has dates of its own, from 2026-05-01T08:00:00+02:00 on" in capsys.readouterr().err

@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.files.limits import check_room
+from jeat_graph.io.files.unpacking import check_unpacked, most_unpacked
 
 #: What a zip of `MOT 1.1` holds: lines of MOTChallenge text, and the names of the classes that they number.
 MEMBER, LABELS = "gt/gt.txt", "gt/labels.txt"
@@ -33,7 +33,7 @@ def read_member(path: str | Path, name: str) -> bytes | None:
         name: of the file in it, with its folder.
 
     Raises:
-        DataError: the archive is damaged or encrypted, or the file does not fit into memory.
+        DataError: the archive is damaged or encrypted, or the file unpacks to more than it may.
     """
     if not is_zip(path):
         return None
@@ -44,8 +44,13 @@ def read_member(path: str | Path, name: str) -> bytes | None:
             info = archive.getinfo(name)
             if info.flag_bits & 1 or info.compress_type not in _STORED:
                 raise DataError(f"{name} in it is encrypted or packed in an unusual way; unpack it", path)
-            check_room(info.file_size, path)
-            return archive.read(info)
+            # What the archive says of itself may be wrong: no more is unpacked than may be.
+            check_unpacked(info.file_size, info.compress_size, path, name)
+            most = most_unpacked(info.compress_size)
+            with archive.open(info) as member:
+                data = member.read(most + 1)
+            check_unpacked(len(data), info.compress_size, path, name)
+            return data
     except DataError:
         raise
     except Exception as error:  # zipfile raises nearly anything on a damaged archive

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_numbers import FrameCount, first_frame
+from jeat_graph.data.frame_numbers import FrameCount, first_frame, split_picture_name
+from jeat_graph.data.notes import note
 from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.tables.reading import Reading
 from jeat_graph.data.videos import choose_video
 from jeat_graph.io.tables.coco_entries import finite_number
+
+#: What says an image's frame: of video data sets, and of TAO and YouTube-VIS.
+_FRAME_KEYS = ("frame_id", "frame_index")
 
 
 class Images(NamedTuple):
@@ -59,7 +64,8 @@ def read_images(tree: Mapping[str, Any], how: Reading, path: str | Path) -> Imag
         by_name.setdefault(Path(name).stem, image["id"])
         by_name[name] = image["id"]
     own = _of_one_video(images, tree, how, path)
-    time, frames = _times(own, how, path)
+    rate_hz = how.rate_hz if how.rate_hz is not None else _rate_of(own, tree)
+    time, frames = _times(own, replace(how, rate_hz=rate_hz), path)
     return Images(time, known, by_name, frames)
 
 
@@ -88,10 +94,51 @@ def _of_one_video(
     ]
 
 
+def _rate_of(images: list[tuple[int, dict[str, Any]]], tree: Mapping[str, Any]) -> float | None:
+    """Frames per second (Hz) that the data set says of the images' video (`fps`); None where it does not."""
+    videos = tree.get("videos")
+    labels = {image.get("video_id") for _, image in images}
+    found = {
+        video.get("fps")
+        for video in (videos if isinstance(videos, list) else [])
+        if isinstance(video, dict) and isinstance(video.get("id"), int | str) and video["id"] in labels
+        if isinstance(video.get("fps"), int | float) and not isinstance(video["fps"], bool)
+    }
+    return float(found.pop()) if len(found) == 1 else None
+
+
+def _frame_number(image: Mapping[str, Any], named: Mapping[int, int]) -> float:
+    """Number of an image's frame: as it says, as its name says, else its id.
+
+    Raises:
+        TypeError, ValueError, OverflowError: what it says is no finite number.
+    """
+    said = next((image[key] for key in _FRAME_KEYS if key in image), None)
+    return finite_number(named.get(image["id"], image["id"]) if said is None else said)
+
+
+def _numbers_in_names(images: list[dict[str, Any]]) -> dict[int, int]:
+    """Frame number in the file name of each image, by its id; empty unless the names number the frames.
+
+    They do where no image says its frame or time, all are called alike but for a number, and no number is
+    there twice. A name then says when a picture was taken, an id only which it is.
+    """
+    parts = {image["id"]: split_picture_name(str(image.get("file_name", ""))) for image in images}
+    found = {number: part for number, part in parts.items() if part is not None}
+    numbers = [part[1] for part in found.values()]
+    alike = len({part[0] for part in found.values()}) == 1
+    whole = len(found) == len(images) and len(set(numbers)) == len(numbers)
+    said = any(key in image for image in images for key in ("timestamp", *_FRAME_KEYS))
+    return {number: part[1] for number, part in found.items()} if alike and whole and not said else {}
+
+
 def _times(
     images: list[tuple[int, dict[str, Any]]], how: Reading, path: str | Path
 ) -> tuple[dict[int, float], FrameCount | None]:
     """Time (s) of each image by its id, and their numbers where they count."""
+    named = _numbers_in_names([image for _, image in images])
+    if any(named[image["id"]] != image["id"] for _, image in images if image["id"] in named):
+        note(f"{path}: frames are numbered as the names of the pictures number them, not as their ids do")
     stamped: dict[int, float] = {}
     counted: dict[int, float] = {}
     for k, image in images:
@@ -99,9 +146,11 @@ def _times(
             if "timestamp" in image:
                 stamped[image["id"]] = finite_number(image["timestamp"])
             else:
-                counted[image["id"]] = finite_number(image.get("frame_id", image["id"]))
+                counted[image["id"]] = _frame_number(image, named)
         except (TypeError, ValueError, OverflowError):
-            raise DataError(f"image {k + 1}: timestamp and frame_id must be finite numbers", path) from None
+            raise DataError(
+                f"image {k + 1}: timestamp, frame_id and frame_index must be finite numbers", path
+            ) from None
         if how.rate_hz is None and "timestamp" not in image:
             raise DataError(
                 f"image {k + 1} has no `timestamp`; give the frame rate (--rate, in Python rate_hz)", path
