@@ -20,6 +20,7 @@ from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.together import Reader, read_together
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
+from jeat_graph.eval.motion_units import motion_in_picture
 from jeat_graph.eval.pairing import check_lives, check_pair, check_truth
 from jeat_graph.eval.resampling import on_the_clock_of
 from jeat_graph.io.files.beside import check_beside
@@ -302,7 +303,7 @@ def _read_truth(path: Path, how: Reading) -> tuple[GroundTruth, FrameCount | Non
         check_truth(truth)
     except DataError as error:
         raise DataError(error.message, path) from error
-    return truth, first
+    return motion_in_picture(truth, str(path)), first
 
 
 def counted_as_run(

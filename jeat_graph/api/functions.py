@@ -14,6 +14,7 @@ from jeat_graph.config.reading import as_config
 from jeat_graph.config.schema import Config, Preset
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError, InputWarning
+from jeat_graph.data.notes import listening
 from jeat_graph.data.tables.reading import ReadingOptions, TableOptions
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 
@@ -140,7 +141,8 @@ def evaluate(
     if outside not in ("false", "ignored"):
         raise DataError(f"outside {outside!r}: must be false or ignored")
     if isinstance(tracks, (str, Path)) and isinstance(truth, (str, Path)):
-        run = load_run(tracks, truth, classes=ignoring, counted=recorded_frames(tracks), **options)
+        with listening(lambda line: warnings.warn(line, InputWarning, stacklevel=6)):
+            run = load_run(tracks, truth, classes=ignoring, counted=recorded_frames(tracks), **options)
         if ignoring is not None:
             check_classes([run.truth], ignoring)
     else:

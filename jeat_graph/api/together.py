@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,9 @@ from jeat_graph.api.sources import (
     truth_of,
 )
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.errors import InputWarning
 from jeat_graph.data.frame_numbers import FrameCount
+from jeat_graph.data.notes import listening
 from jeat_graph.data.rates import ANY_RATE_HZ
 from jeat_graph.data.tables.detection_table import rows_of_frame
 from jeat_graph.data.tables.reading import Reading
@@ -26,6 +29,7 @@ from jeat_graph.data.together import Reader, read_together
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.data.truth_frames import truth_of_frame_counted
 from jeat_graph.eval.load import counted_as_run, read_tables_counted
+from jeat_graph.eval.motion_units import motion_in_picture
 from jeat_graph.io.tables.detections_io import read_detections_counted
 from jeat_graph.io.tables.scans_io import read_instants
 from jeat_graph.io.tables.truth_io import read_truth_counted
@@ -35,6 +39,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from jeat_graph.data.tables.reading import ReadingOptions
+
+
+def _warn(line: str) -> None:
+    """Say what a reader found out, to whoever called a function of one call."""
+    warnings.warn(line, InputWarning, stacklevel=5)
 
 
 def recording_and_truth(
@@ -48,8 +57,9 @@ def recording_and_truth(
         DataError: one of them is not valid.
     """
     readers = [truth_reader(truth, options), recording_reader(detections, options)]
-    (objects, recording), _ = read_together(readers, options.get("first_frame"), truth=0)
-    return recording, objects
+    with listening(_warn):
+        (objects, recording), _ = read_together(readers, options.get("first_frame"), truth=0)
+        return recording, motion_in_picture(objects, readers[0].title)
 
 
 def tracks_and_truth(
@@ -73,7 +83,9 @@ def tracks_and_truth(
     is_read = isinstance(tracks, (str, Path)) or hasattr(tracks, "columns")
     of_tracks: ReadingOptions = {**options, "time_unit": "s"} if is_read else options
     readers = [truth_reader(truth, options), tracks_reader(tracks, kind, of_tracks)]
-    (objects, tables), counts = read_together(readers, options.get("first_frame"), truth=0)
+    with listening(_warn):
+        (objects, tables), counts = read_together(readers, options.get("first_frame"), truth=0)
+        objects = motion_in_picture(objects, readers[0].title)
     if readers[1].settled and isinstance(tracks, (str, Path)):
         rate_hz = options.get("rate_hz") or ANY_RATE_HZ
         objects = counted_as_run(objects, recorded_frames(tracks), counts[1], rate_hz)

@@ -12,6 +12,7 @@ from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.together import Reader, read_together
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.load import counted_as_run
+from jeat_graph.eval.motion_units import motion_in_picture
 from jeat_graph.io.formats.registry import recognise
 from jeat_graph.io.tables.truth_io import read_truth_counted
 from jeat_graph.runs.beside import recorded_frames
@@ -42,4 +43,4 @@ def read_truth_of_run(
     ]
     (objects, _), counts = read_together(readers, how.first_frame, truth=0)
     rate_hz = how.rate_hz or recognise(truth).rate_hz or ANY_RATE_HZ
-    return counted_as_run(objects, own, counts[1], rate_hz)
+    return motion_in_picture(counted_as_run(objects, own, counts[1], rate_hz), str(truth))

@@ -174,3 +174,10 @@ def _latency(path):
 
     sensors = yaml.safe_load(path.read_text())["sensors"]
     return float(np.max([abs(one.get("latency_s", 0.0)) for one in sensors.values()]))
+
+
+def test_python_says_it_in_a_warning(tmp_path):
+    from jeat_graph.data.errors import InputWarning
+
+    with pytest.warns(InputWarning, match="frames count from 0, as those of the run do"):
+        evaluate(csv(tmp_path / "res", RESULT), csv(tmp_path / "gt", TRUTH), rate_hz=HZ)
