@@ -31,7 +31,7 @@ _RATES = ("video_fps", "fps", "frame_rate")
 _NO_IDENTITY = -1
 
 
-class _Rows:
+class _JsonColumns:
     """Objects as a table with columns."""
 
     def __init__(self, rows: list[dict[str, Any]]) -> None:
@@ -97,7 +97,7 @@ def _load(path: str | Path) -> list[dict[str, Any]]:
 
 def _table(rows: list[dict[str, Any]], path: Path) -> FileTable:
     try:
-        columns = named_columns(_Rows(rows), ("t", *BOX), _OPTIONAL, "boxes")
+        columns = named_columns(_JsonColumns(rows), ("t", *BOX), _OPTIONAL, "boxes")
     except DataError as error:
         more = '; JSONSink writes it with custom_data={"frame": k}' if "column t" in error.message else ""
         raise DataError(error.message + more, path) from None
