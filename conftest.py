@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import multiprocessing
 import os
+import shutil
 import sys
+import tempfile
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,6 +19,10 @@ _TESTS = Path(__file__).parent / "tests"
 # The tests share the cores: the threads of one's linear algebra would only wait for those of the others.
 # This is before anything that loads it.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+if "JEAT_GRAPH_NETWORKS" not in os.environ:
+    # No network of whoever runs the tests, and no choice of a detector that a test keeps for a camera.
+    os.environ["JEAT_GRAPH_NETWORKS"] = tempfile.mkdtemp(prefix="jeat-graph-networks-")
+    atexit.register(shutil.rmtree, os.environ["JEAT_GRAPH_NETWORKS"], ignore_errors=True)
 
 # Examples follow from the test and from the constants in the modules that are loaded, not from a clock:
 # what a test counts over its examples still differs a little with what ran before it, and its bound must

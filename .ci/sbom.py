@@ -1,12 +1,13 @@
-"""Write the software bill of materials of the wheel: the packages it needs, and what its core holds.
+"""Write the software bill of materials of the wheel: packages it needs, libraries and networks it holds.
 
 `python .ci/sbom.py PYTHON OUT.cdx.json` lists the environment of a Python in which the wheel is installed
-(`cyclonedx-py`, CycloneDX 1.6), and adds the libraries that are compiled into the core, which no metadata of
-Python's packages names. The same environment gives the same bytes.
+(`cyclonedx-py`, CycloneDX 1.6), and adds what no metadata of Python's packages names: the libraries that are
+compiled into the core, and the networks that the wheel holds. The same environment gives the same bytes.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import runpy
 import subprocess
@@ -37,6 +38,27 @@ def compiled_components() -> list[dict[str, Any]]:
     ]
 
 
+#: Where the networks lie, and their licence: they were trained by this project, on pictures that it rendered.
+WEIGHTS = Path("jeat_graph") / "detection" / "weights"
+WEIGHTS_LICENCE = "Apache-2.0"
+
+
+def network_components(folder: Path = WEIGHTS) -> list[dict[str, Any]]:
+    """Components of the networks that come along, each with its SHA-256, in CycloneDX's form."""
+    return [
+        {
+            "type": "machine-learning-model",
+            "name": path.stem,
+            "bom-ref": f"network:{path.name}",
+            "licenses": [{"license": {"id": WEIGHTS_LICENCE}}],
+            "hashes": [{"alg": "SHA-256", "content": hashlib.sha256(path.read_bytes()).hexdigest()}],
+            "description": f"weights in jeat_graph/detection/weights/{path.name}, trained by this project on "
+            "pictures and events that it rendered",
+        }
+        for path in sorted(folder.glob("*.onnx"))
+    ]
+
+
 def main() -> int:
     """Write the list; the exit code."""
     python, out = sys.argv[1:]
@@ -55,7 +77,7 @@ def main() -> int:
         sys.stderr.write(done.stderr)
         return 1
     bill = json.loads(done.stdout)
-    added = compiled_components()
+    added = [*compiled_components(), *network_components()]
     bill["components"] = sorted([*bill.get("components", []), *added], key=lambda one: str(one["bom-ref"]))
     bill["metadata"]["component"]["version"] = runpy.run_path("jeat_graph/version.py")["__version__"]
     root = bill["metadata"]["component"]["bom-ref"]

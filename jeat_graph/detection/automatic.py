@@ -3,8 +3,9 @@
 Known networks that are on this machine, and the package's own `sehn`, look at some of the pictures. Of the
 former only those boxes count that are more likely real than not (`even_score`). A box is *sound* where
 something moves in it, or where the network is sure. A network is trusted if most of its boxes are sound and
-it sees some of what moves; of those the one that finds most is taken. Otherwise `motion` is.
-Nothing is fetched.
+it sees some of what moves; of those the one that finds most is taken. Otherwise `motion` is. Who tracks wants
+classes, so a network that knows none has to find half as much again, and of its boxes only those count in
+which something moves: on a gantry it would win by ghosts. Nothing is fetched.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from jeat_graph.detection.frame_source import frames_of
 from jeat_graph.detection.known_networks import KNOWN
 from jeat_graph.detection.models.pictures import ModelPictureDetector
 from jeat_graph.detection.named import AUTO, FRAMES, MOTION, networks
-from jeat_graph.detection.network_cache import cached
+from jeat_graph.detection.network_cache import cache_folder, cached
 from jeat_graph.detection.opencv_threads import one_thread
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.request import DetectRequest
@@ -43,6 +44,8 @@ _MOVING, _SURE = 0.3, 0.5
 _LEAST_SOUND, _LEAST_BOXES, _LEAST_SEEN = 0.6, 0.3, 0.1
 #: Of networks that find nearly as many, the better one on COCO is taken.
 _NEARLY = 0.75
+#: What a box is counted for that has no class, beside one that has.
+_WITHOUT_CLASS = 2.0 / 3.0
 
 
 class Impression(NamedTuple):
@@ -54,6 +57,8 @@ class Impression(NamedTuple):
         sound: share of its boxes in which something moves, or of which it is sure.
         seen: share of what moves, by area, that lies in its boxes; 1 where nothing moves.
         accuracy: AP on COCO (per cent), 0 where it is not of COCO.
+        moving: share of its boxes in which something moves.
+        classes: whether it tells classes.
     """
 
     name: str
@@ -61,6 +66,15 @@ class Impression(NamedTuple):
     sound: float
     seen: float
     accuracy: float = 0.0
+    moving: float = 1.0
+    classes: bool = True
+
+    @property
+    def finds(self) -> float:
+        """How many things it finds a picture, as they are counted for its choice."""
+        if self.classes:
+            return self.boxes * self.sound
+        return self.boxes * min(self.sound, self.moving) * _WITHOUT_CLASS
 
     @property
     def trusted(self) -> bool:
@@ -70,7 +84,7 @@ class Impression(NamedTuple):
     def __str__(self) -> str:
         return (
             f"{self.name} {self.boxes:.1f} boxes a picture, {100 * self.sound:.0f} % sound, sees "
-            f"{100 * self.seen:.0f} % of what moves"
+            f"{100 * self.seen:.0f} % of what moves{'' if self.classes else ', tells no classes'}"
         )
 
 
@@ -100,6 +114,7 @@ def chosen_by(
     times_s: FloatArray,
     settings: DetectionSettings,
     say: Callable[[str], object] = lambda _: None,
+    convinced: Callable[[str], object] = lambda _: None,
 ) -> str:
     """Return the name of the detector to take, by pictures of some seconds, and say how it was chosen.
 
@@ -108,6 +123,7 @@ def chosen_by(
         times_s: (F,) their times (s), ascending.
         settings: of the detectors.
         say: called with a line that says what was chosen, and why.
+        convinced: called with the name if there was something to choose by.
 
     Raises:
         ConfigError: classes are asked for that nothing here knows.
@@ -121,12 +137,15 @@ def chosen_by(
             found.append(_impression(name, look, accuracy, pictures))
         except DataError as error:  # a network that does not work here is none
             say(str(error))
-    chosen = choose_among(found, any(len(boxes) for boxes in moving))
+    anything_moves = any(len(boxes) for boxes in moving)
+    chosen = choose_among(found, anything_moves)
     if chosen == MOTION and settings.model_frames.classes:
         raise ConfigError(
             "--class: no detector here that can be trusted knows classes; --detector-frames NAME"
         )
     tried = "; ".join(str(one) for one in found) or "no network of road users is on this machine"
+    if anything_moves or any(one.trusted for one in found):
+        convinced(chosen)
     say(f"detector: {chosen}, by the first {LOOK_S:g} s ({tried}); --detector-frames NAME takes another")
     return chosen
 
@@ -145,8 +164,8 @@ def choose_among(found: Sequence[Impression], anything_moves: bool) -> str:
         if anything_moves or not silent:
             return MOTION
         return max(silent, key=lambda one: one.accuracy).name
-    most = max(one.boxes * one.sound for one in trusted)
-    near = [one for one in trusted if one.boxes * one.sound >= _NEARLY * most]
+    most = max(one.finds for one in trusted)
+    near = [one for one in trusted if one.finds >= _NEARLY * most]
     return max(near, key=lambda one: (one.accuracy, one.boxes)).name
 
 
@@ -166,6 +185,12 @@ def _moving(frames: Sequence[RgbImage], times_s: FloatArray, settings: PictureSe
     detector.prime(frames)
     scans = [detector(frame, float(t)) for frame, t in zip(frames, times_s, strict=True)]
     return [none if scan is None else scan.boxes for scan in scans]
+
+
+def names_here() -> list[str]:
+    """Return the names of the detectors that `auto` may choose on this machine now."""
+    known = [network.name for network in KNOWN.values() if (cache_folder() / network.file).is_file()]
+    return [MOTION, *known, *([HIGHWAYS] if HIGHWAYS in networks(FRAMES) else [])]
 
 
 def _candidates(
@@ -196,7 +221,7 @@ def _impression(
     accuracy: float,
     pictures: Sequence[tuple[RgbImage, FloatArray]],
 ) -> Impression:
-    boxes = sound = 0
+    boxes = sound = moves = 0
     seen = moved = 0.0
     for frame, moving in pictures:
         scan = look(frame, 0.0)
@@ -205,7 +230,9 @@ def _impression(
         common = _common(found, moving)
         areas, mass = found[:, 2:].prod(axis=1), moving[:, 2:].prod(axis=1)
         boxes += len(found)
-        sound += int(((common.sum(axis=1) >= _MOVING * areas) | (scores >= _SURE)).sum())
+        stirring = common.sum(axis=1) >= _MOVING * areas
+        moves += int(stirring.sum())
+        sound += int((stirring | (scores >= _SURE)).sum())
         seen += float(np.minimum(common.sum(axis=0), mass).sum())
         moved += float(mass.sum())
     return Impression(
@@ -214,6 +241,8 @@ def _impression(
         sound / boxes if boxes else 0.0,
         seen / moved if moved else 1.0,
         accuracy,
+        moves / boxes if boxes else 0.0,
+        look.tells_classes,
     )
 
 

@@ -14,6 +14,7 @@ from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.burnt_in import find_clock
 from jeat_graph.detection.camera_flow import CameraFlow
 from jeat_graph.detection.detecting import CLOCK_S, EVENTS_SENSOR, FRAMES_SENSOR, event_detector
+from jeat_graph.detection.kept_choice import keep_choice, kept_choice
 from jeat_graph.detection.named import AUTO, FRAMES, MOTION, network_file
 from jeat_graph.detection.picture_detector import PictureDetector
 from jeat_graph.detection.request import DetectRequest
@@ -70,7 +71,13 @@ class PictureWorker(Worker[LivePicture]):
         self._other_size = False
 
     def prepare(self, stopped: Until) -> None:
-        """Wait for the first picture, and choose a detector if none is named."""
+        """Wait for the first picture, and choose a detector if none is named, or take the one kept."""
+        camera, settings = self.reader.status.name, self._request.settings
+        if self.detector == AUTO:
+            kept = kept_choice(camera, settings)
+            if kept is not None:
+                self.detector = kept
+                self._say(f"detector: {kept}, as chosen at an earlier start; --detector-frames takes others")
         frames: list[RgbImage] = []
         times: list[float] = []
         for picture in self.items(stopped):
@@ -82,7 +89,13 @@ class PictureWorker(Worker[LivePicture]):
             if self.detector != AUTO or times[-1] - times[0] >= LOOK_S:
                 break
         if self.detector == AUTO and frames:
-            self.detector = chosen_by(frames, np.array(times), self._request.settings, self._say)
+            self.detector = chosen_by(
+                frames,
+                np.array(times),
+                settings,
+                self._say,
+                lambda chosen: keep_choice(camera, settings, chosen),
+            )
 
     def _fits(self, picture: LivePicture) -> bool:
         """Tell whether a picture has the size of the first one, and say it of the first that has not."""

@@ -14,8 +14,11 @@ import pytest
 from jeat_graph.cli.main import main
 from jeat_graph.detection import network_cache
 from jeat_graph.detection.automatic import Impression, choose_among, resolved
+from jeat_graph.detection.kept_choice import keep_choice, kept_choice
+from jeat_graph.detection.known_networks import KNOWN
 from jeat_graph.detection.named import AUTO
 from jeat_graph.detection.request import DetectRequest
+from jeat_graph.detection.settings import DetectionSettings, load_settings
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 
@@ -28,11 +31,16 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.setenv(network_cache.FOLDER, str(folder))
     monkeypatch.setattr(network_cache, "is_private", lambda _: True)
     monkeypatch.setenv(network_cache.MIRROR, "http://127.0.0.1:9")  # nothing is fetched
+    monkeypatch.setitem(KNOWN, "yolox-tiny", KNOWN["yolox-tiny"]._replace(sha256=()))  # any file is it
     return folder
 
 
-def impression(name="yolox-s", boxes=2.0, sound=0.9, seen=0.5, accuracy=40.5):
-    return Impression(name, boxes, sound, seen, accuracy)
+def impression(name="yolox-s", boxes=2.0, sound=0.9, seen=0.5, accuracy=40.5, **more):
+    return Impression(name, boxes, sound, seen, accuracy, **more)
+
+
+#: One that knows no classes, as `sehn` is.
+NO_CLASSES = {"name": "sehn", "accuracy": 0.0, "classes": False}
 
 
 @pytest.mark.parametrize(
@@ -48,6 +56,10 @@ def impression(name="yolox-s", boxes=2.0, sound=0.9, seen=0.5, accuracy=40.5):
         ([impression(), impression("sehn", boxes=6.0, accuracy=0.0)], True, "sehn"),  # a highway
         ([impression(), impression("sehn", boxes=6.0, sound=0.3, accuracy=0.0)], True, "yolox-s"),
         ([impression("yolox-nano", 2.4, accuracy=25.8), impression("yolox-s", 2.1)], True, "yolox-s"),
+        # A gantry: four ghosts that stand, and no classes.
+        ([impression(boxes=5.0), impression(boxes=9.0, moving=5 / 9, **NO_CLASSES)], True, "yolox-s"),
+        ([impression(boxes=5.0), impression(boxes=6.0, **NO_CLASSES)], True, "yolox-s"),
+        ([impression(boxes=2.0), impression(boxes=6.0, **NO_CLASSES)], True, "sehn"),
     ],
 )
 def test_the_one_that_sees_most_of_those_that_are_sound_is_taken(found, moves, chosen):
@@ -141,6 +153,32 @@ def fails_late(capsys):
         return capsys.readouterr().err.splitlines()[-1]
 
     return run
+
+
+def test_the_choice_for_a_camera_is_kept_while_the_same_networks_are_here(folder):
+    usual, bicycles = DetectionSettings(), load_settings(None, ["model_frames.classes=[bicycle]"])
+    assert kept_choice("rtsp://gantry/1", usual) is None
+    keep_choice("rtsp://gantry/1", usual, "sehn")
+    keep_choice("rtsp://gantry/2", usual, "motion")
+    assert kept_choice("rtsp://gantry/1", usual) == "sehn"
+    assert kept_choice("rtsp://gantry/2", usual) == "motion"
+    assert kept_choice("rtsp://gantry/1", bicycles) is None  # other classes are looked for
+    (folder / "yolox_tiny.onnx").write_bytes(b"new here")
+    assert kept_choice("rtsp://gantry/1", usual) is None
+    for damaged in (b"", b"[]", b'{"rtsp://gantry/1": 3}', b"\xff"):
+        (folder / "chosen.json").write_bytes(damaged)
+        assert kept_choice("rtsp://gantry/1", usual) is None
+    keep_choice("rtsp://gantry/1", usual, "yolox-tiny")
+    assert kept_choice("rtsp://gantry/1", usual) == "yolox-tiny"
+
+
+def test_a_choice_by_an_empty_road_is_not_kept(tmp_path):
+    from jeat_graph.detection.automatic import chosen_by
+
+    still = [np.full((96, 128, 3), 110, dtype=np.uint8)] * 12
+    kept: list[str] = []
+    chosen_by(still, np.arange(12) / 4, DetectionSettings(), convinced=kept.append)
+    assert kept == []
 
 
 def test_a_name_is_never_second_guessed(tmp_path):

@@ -112,6 +112,38 @@ def test_commands_are_understood(words):
     assert args.command == words[0]
 
 
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_configurations_that_a_page_names_are_there(page):
+    """In blocks and in prose alike: what `--config` takes is a preset, a file, or stands for a name."""
+    named = re.findall(r"--config[= ]([^\s`'\"|,;)\]]+)", page.read_text(encoding="utf-8"))
+    stand_ins = {"FILE", "NAME", "NAME|FILE", "…", "NAME|FILE.yaml"}
+    there = {path.stem for path in (ROOT / "configs").glob("*.yaml")}
+    strange = [one for one in named if one not in there | stand_ins and not one.endswith((".yaml", ".yml"))]
+    assert strange == []
+
+
+IN_PROSE = [
+    pytest.param(text, id=f"{name(page)}: {text}"[:90])
+    for page in PAGES
+    for text in re.findall(r"`jeat-graph ([^`\n]+)`", page.read_text(encoding="utf-8"))
+    if page.name not in GENERATED
+]
+
+
+@pytest.mark.parametrize("text", IN_PROSE)
+def test_commands_in_prose_are_understood(text):
+    words = shlex.split(text.split(" | ")[0])
+    if words[0].startswith("-") or words[0].isupper():
+        pytest.skip("shows the command itself")
+    assert words[0] in COMMANDS
+    options = [word.split("=")[0] for word in words[1:] if word.startswith("--")]
+    commands_there = next(one for one in build_parser(words[0])._actions if isinstance(one.choices, dict))
+    parser = commands_there.choices[words[0]]
+    below = [one.choices for one in parser._actions if isinstance(one.choices, dict)]
+    known = "".join(one.format_help() for one in (parser, *(sub for subs in below for sub in subs.values())))
+    assert [option for option in options if option not in known] == []
+
+
 def test_benchmarks_are_understood():
     run = [words for page in PAGES for words in benchmarks_run(page)]
     assert len(run) > 5

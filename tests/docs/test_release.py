@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
+import runpy
 import tomllib
 from pathlib import Path
 
@@ -31,6 +33,20 @@ def test_licences_of_what_is_compiled_into_the_core_go_into_the_wheel(name):
     text = (ROOT / "licenses" / f"{name}.txt").read_text(encoding="utf-8")
     assert "Copyright (c)" in text
     assert "WARRANT" in text
+
+
+def test_the_bill_of_materials_lists_every_network_that_comes_along_with_its_licence():
+    made = runpy.run_path(str(ROOT / ".ci" / "sbom.py"))
+    weights = ROOT / "jeat_graph" / "detection" / "weights"
+    listed = {
+        one["description"].split(",")[0].rpartition("/")[2]: one
+        for one in made["network_components"](weights)
+    }
+    assert sorted(listed) == sorted(path.name for path in weights.glob("*.onnx"))
+    assert len(listed) == 7
+    for name, one in listed.items():
+        assert one["licenses"] == [{"license": {"id": "Apache-2.0"}}]
+        assert one["hashes"][0]["content"] == hashlib.sha256((weights / name).read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)

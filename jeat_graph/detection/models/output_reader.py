@@ -135,6 +135,11 @@ class OutputReader:
             return None
         return np.array([self._names.get(one, str(one)) for one in classes.tolist()], dtype=np.str_)
 
+    @property
+    def tells_classes(self) -> bool:
+        """Whether what is found has classes."""
+        return self._names is not None
+
     def note(self) -> str:
         """Say how many boxes were left out because they had no numbers; empty if none were."""
         if not self.no_numbers:

@@ -26,6 +26,7 @@ class ModelPictureDetector:
 
     Attributes:
         description: one line that says what was recognised.
+        tells_classes: whether its boxes have classes.
         even_score: at which a box is as likely real as not, as of the layout; None for files of `train`.
 
     Raises:
@@ -46,6 +47,7 @@ class ModelPictureDetector:
         )
         layout = self._outputs.layout
         self.even_score = None if CARD in head.notes else all_layouts()[layout].even_score
+        self.tells_classes = self._outputs.tells_classes
         self._feed = usual_feed(layout, self._settings)
         self._engine = engine()
         width, height = self._side
