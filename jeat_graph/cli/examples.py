@@ -40,6 +40,7 @@ EXAMPLES = {
     "camera": "jeat-graph camera calibrate --run run --lengths lengths.csv --out camera.yaml",
     "road": "jeat-graph road run --camera camera.yaml --out speeds",
     "handover": "jeat-graph handover A=speeds-a B=speeds-b --distance A-B=500±5 --out through",
+    "conflicts": "jeat-graph conflicts speeds --camera camera.yaml --out near-misses",
 }
 
 

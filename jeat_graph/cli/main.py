@@ -44,6 +44,7 @@ COMMANDS = (
     "camera",
     "road",
     "handover",
+    "conflicts",
     "events",
     "detect",
     "detectors",

@@ -1,0 +1,267 @@
+"""Encounters of vehicles on the road, and which of them are conflicts beyond reasonable doubt.
+
+What is not known of two vehicles (place, speed, heading, size) is drawn, the same errors every time; each
+measure is computed of each draw. Its interval is that of the draws, and the probability of a conflict is the
+share of the draws that are beyond a threshold.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from jeat_graph.config.fields import check, number
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.road.conflicts.measures import Collision, arrivals, collision, encroachment, separation
+from jeat_graph.road.conflicts.poses import HEADING, LENGTH, SPEED, Poses
+from jeat_graph.road.speeds import Z95
+
+REAR_END, CROSSING, HEAD_ON = "rear-end", "crossing", "head-on"
+_STEP_S, _COARSE_S = 0.05, 0.15
+_DRAWS = 160
+#: A time to collision is looked for this long before and after its least (s).
+_AROUND_S = 1.0
+#: The fine grid of post-encroachment times: this wide to either side (s), and this many steps.
+_FINE_S, _FINE = 0.4, 14
+_PERCENT = (2.5, 97.5)
+_LARGEST_SIDE_M = 12.0
+
+
+@dataclass(frozen=True)
+class ConflictConfig:
+    """What counts as a conflict.
+
+    TTC of 1.5 s is Hayward's and the default of the FHWA's SSAM; 3.35 m/s² is Archer's (2005); a PET of 1 s
+    is that of serious conflicts. Among vehicles that follow one another a short time gap is a headway, so the
+    PET is judged where paths cross.
+    """
+
+    ttc_s: float = number(1.5, "s", "time to collision below which it is a conflict", open_low=True)
+    drac: float = number(3.35, "m/s²", "deceleration to avoid a crash above which it is", open_low=True)
+    pet_s: float = number(1.0, "s", "post-encroachment time below which it is, where paths cross")
+    most_doubt: float = number(0.05, "1", "probability that it is none, at most", high=1.0)
+    longest_s: float = number(5.0, "s", "those farther apart in time do not meet", open_low=True)
+    following_deg: float = number(30.0, "degrees", "paths at a smaller angle follow or meet", high=90.0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
+class Measured(NamedTuple):
+    """A measure with its 95 % interval; NaN or infinite where there is none.
+
+    Attributes:
+        value: the estimate.
+        low: lower end.
+        high: upper end.
+    """
+
+    value: float
+    low: float
+    high: float
+
+
+NOTHING = Measured(math.nan, math.nan, math.nan)
+
+
+class Encounter(NamedTuple):
+    """Two vehicles that come close.
+
+    Attributes:
+        first: identity of the one that is ahead, or first at the place where paths cross.
+        second: of the other.
+        first_kind: class of the first.
+        second_kind: class of the second.
+        kind: `rear-end`, `crossing` or `head-on`.
+        t: when the time to collision is least; without one, when the second takes the first's place (s).
+        x: where the second is then, across the road (m).
+        y: along it (m).
+        ttc: least time to collision (s).
+        drac: deceleration that avoids the crash, its most (m/s²).
+        pet: post-encroachment time (s).
+        headway: from front to front at one place, of those that follow (s).
+        probability: that it is a conflict by one of the thresholds.
+    """
+
+    first: int
+    second: int
+    first_kind: str
+    second_kind: str
+    kind: str
+    t: float
+    x: float
+    y: float
+    ttc: Measured
+    drac: Measured
+    pet: Measured
+    headway: Measured
+    probability: float
+
+
+@functools.cache
+def _errors() -> FloatArray:
+    """Standard normal errors (K, 12) of two vehicles; the first draw is without."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    z = ndtri(qmc.Halton(12, scramble=True, rng=0).random(_DRAWS // 2))
+    return np.concatenate([np.zeros((1, 12)), z, -z])
+
+
+def encounters(
+    vehicles: Sequence[Poses],
+    config: ConflictConfig,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Encounter]:
+    """Find all pairs that may be conflicts, in order of time.
+
+    Args:
+        vehicles: the vehicles.
+        config: thresholds.
+        progress: hears how many vehicles of how many are done.
+
+    Returns:
+        Those with a probability above 0; `sure` tells which are beyond doubt.
+    """
+    order = sorted(range(len(vehicles)), key=lambda k: (vehicles[k].t[0], vehicles[k].track_id))
+    boxes = [(v.mean[:, :2].min(axis=0), v.mean[:, :2].max(axis=0)) for v in vehicles]
+    found = []
+    for i, k in enumerate(order):
+        one = vehicles[k]
+        for j in order[i + 1 :]:
+            other = vehicles[j]
+            if other.t[0] > one.t[-1] + config.longest_s:
+                break
+            (low, high), (least, most) = boxes[k], boxes[j]
+            if (low > most + _LARGEST_SIDE_M).any() or (least > high + _LARGEST_SIDE_M).any():
+                continue
+            encounter = _encounter(one, other, config)
+            if encounter is not None and encounter.probability > 0.0:
+                found.append(encounter)
+        if progress is not None:
+            progress(i + 1, len(order))
+    return sorted(found, key=lambda e: (e.t, e.first, e.second))
+
+
+def sure(encounter: Encounter, config: ConflictConfig) -> bool:
+    """Whether it is a conflict with no more doubt than is allowed."""
+    return encounter.probability >= 1.0 - config.most_doubt
+
+
+def _encounter(one: Poses, other: Poses, config: ConflictConfig) -> Encounter | None:
+    """Measure two vehicles; None where they do not come close."""
+    meeting = _first_of(one, other, config)
+    if meeting is None:
+        return None
+    first, second, t_first, t_second = meeting
+    together = _least_ttc(first, second)
+    at_second = second.at(np.array([t_second]))
+    angle = _angle(first.at(np.array([t_first])), at_second)
+    follow = angle < config.following_deg
+    kind = REAR_END if follow else HEAD_ON if angle > 180.0 - config.following_deg else CROSSING
+    draws = len(_errors())
+    ttc, drac, times = np.full(draws, np.inf), np.zeros(draws), t_second
+    if together is not None:
+        of_draws, times = together
+        ttc, drac = of_draws
+    pet = _pet(first, second, t_first, t_second)
+    hits = (ttc < config.ttc_s) | (drac > config.drac)
+    if not follow:
+        hits |= pet < config.pet_s
+    place = second.at(np.array([times])).mean[0]
+    headway = NOTHING
+    if follow:
+        leader = first.at(np.array([t_first])).drawn(_errors()[:, :6])[:, 0]
+        headway = _normal(pet + leader[:, LENGTH] / np.maximum(leader[:, SPEED], 0.1))
+    return Encounter(
+        *(first.track_id, second.track_id, first.kind, second.kind, kind),
+        *(times, float(place[0]), float(place[1])),
+        *(_quantiles(ttc), _quantiles(drac), _normal(pet), headway, float(hits.mean())),
+    )
+
+
+def _angle(a: Poses, b: Poses) -> float:
+    turn = abs(float(a.mean[0, HEADING] - b.mean[0, HEADING])) % (2.0 * math.pi)
+    return math.degrees(min(turn, 2.0 * math.pi - turn))
+
+
+def _first_of(one: Poses, other: Poses, config: ConflictConfig) -> tuple[Poses, Poses, float, float] | None:
+    """Return the one that is first where both come, the second, and about when each of them is there (s)."""
+    a, b = (v.at(np.arange(v.t[0], v.t[-1], _COARSE_S)) for v in (one, other))
+    if len(a.t) < 2 or len(b.t) < 2:
+        return None
+    apart = separation(a.mean[:, None], b.mean[None])
+    later = b.t[None, :] - a.t[:, None]
+    near = (apart <= 0.0) & (np.abs(later) <= config.longest_s)
+    if not near.any():
+        return None
+    i, j = np.nonzero(near)
+    if float(np.median(later[i, j])) < 0.0:
+        one, other, a, b, apart, i, j = other, one, b, a, apart.T, j, i
+    comes = arrivals(apart, a.t, b.t)
+    at = int(np.argmin(comes))
+    if math.isfinite(comes[at]):
+        return one, other, float(a.t[at]), float(a.t[at] + comes[at])
+    k = int(np.argmin(np.abs(b.t[j] - a.t[i])))
+    return one, other, float(a.t[i[k]]), float(b.t[j[k]])
+
+
+def _least_ttc(first: Poses, second: Poses) -> tuple[Collision, float] | None:
+    """Least TTC and most DRAC of each draw, and when the estimate's is least; None without common times."""
+    begin, end = max(first.t[0], second.t[0]), min(first.t[-1], second.t[-1])
+    if end - begin < _STEP_S:
+        return None
+    t = np.arange(begin, end, _STEP_S)
+    a, b = first.at(t), second.at(t)
+    plain = collision(a.mean, b.mean)
+    k = int(np.argmin(plain.ttc))
+    if not np.isfinite(plain.ttc[k]):
+        k = int(np.argmin(np.abs(separation(a.mean, b.mean))))
+    around = np.abs(t - t[k]) <= _AROUND_S
+    a, b = first.at(t[around]), second.at(t[around])
+    z = _errors()
+    drawn = collision(a.drawn(z[:, :6]), b.drawn(z[:, 6:]))
+    return Collision(drawn.ttc.min(axis=1), drawn.drac.max(axis=1)), float(t[k])
+
+
+def _pet(first: Poses, second: Poses, t_first: float, t_second: float) -> FloatArray:
+    """Post-encroachment time of each draw (K,), linear in the errors about the estimate."""
+    grids = []
+    for one, t in ((first, t_first), (second, t_second)):
+        here = one.at(np.array([t]))
+        moved_s = 3.0 * float(here.sigma[0, :2].max()) / max(float(here.mean[0, SPEED]), 1.0)
+        reach = _FINE_S + min(moved_s, 2.0)
+        grids.append(np.linspace(max(t - reach, one.t[0]), min(t + reach, one.t[-1]), 2 * _FINE + 1))
+    a, b = first.at(grids[0]), second.at(grids[1])
+    states = np.eye(12)
+    z = np.concatenate([np.zeros((1, 12)), states, -states])
+    plain, up, down = np.split(encroachment(a.drawn(z[:, :6]), a.t, b.drawn(z[:, 6:]), b.t), [1, 13])
+    slope = (up - down) / 2.0
+    never = ~(np.isfinite(up) & np.isfinite(down))
+    drawn = _errors()
+    out = plain[0] + drawn[:, ~never] @ slope[~never]
+    # Where an error of one standard deviation parts the ways, one of half as much may.
+    parts = (never & (np.abs(drawn) > 0.5)).any(axis=1)
+    return np.where(parts, np.inf, np.maximum(out, 0.0))
+
+
+def _quantiles(values: FloatArray) -> Measured:
+    """Estimate (the first draw's) and the interval of the draws (K,)."""
+    finite = np.where(np.isfinite(values), values, 1e9)
+    low, high = np.percentile(finite, _PERCENT)
+    ends = [math.inf if end > 1e8 else float(end) for end in (low, high)]
+    return Measured(float(values[0]), *ends)
+
+
+def _normal(values: FloatArray) -> Measured:
+    """Estimate (the first draw's) and an interval by the spread of the draws that have one (K,)."""
+    known = values[np.isfinite(values)]
+    if not math.isfinite(values[0]) or len(known) < 0.5 * len(values):
+        return NOTHING
+    reach = Z95 * float(known.std())
+    return Measured(float(values[0]), max(float(values[0]) - reach, 0.0), float(values[0]) + reach)
