@@ -37,6 +37,7 @@ LAYERS = (
     ("calibration", "drawing", "road", "corridor", "detection", "live"),
     ("api",),
     ("",),
+    ("exporting",),
     ("cli",),
     ("__main__",),
     ("jeat_graph_sehn",),
@@ -310,8 +311,8 @@ def test_parameters_are_counted(source, number):
 
 def test_layers_ascend():
     low = "data.errors filters.motion smoothers.rts data.detections config.schema"
-    middle = "io.files.atomic io.events.dat io.media.video io.exports.tum tracking.step"
-    high = "eval.metrics runs.directory drawing.palette api.functions cli.main __main__"
+    middle = "io.files.atomic io.events.dat io.media.video io.exports.datex2 tracking.step"
+    high = "eval.metrics runs.directory drawing.palette api.functions exporting.tum cli.main __main__"
     beside = "jeat_graph_sehn.functions benchmarks.speed"
     assert all(
         layer(one) < layer(next_one) for one, next_one in pairwise(f"{low} {middle} {high} {beside}".split())

@@ -188,7 +188,7 @@ def _shown(value: Any) -> str:
     return f"`{value:.15g}`" if isinstance(value, float) else f"`{value}`"
 
 
-_ABOUT_RECORDS = """# Formats, scores and protocols
+_ABOUT_RECORDS = """# Formats, exports, scores and protocols
 
 Made from the records in the code, one in a file of its own; `CONTRIBUTING.md` says how to add one.
 """
@@ -198,6 +198,7 @@ def records_page() -> str:
     """Write what is found by a record as Markdown: formats of boxes, scores, protocols."""
     from jeat_graph.eval.metrics import metrics
     from jeat_graph.eval.protocols.registry import protocols
+    from jeat_graph.exporting.registry import exports
     from jeat_graph.io.formats.registry import formats
 
     read = [(f"`{one.name}`", one.title, one.reads, one.suffix and f"`{one.suffix}`") for one in formats()]
@@ -207,6 +208,7 @@ def records_page() -> str:
         for unit, named in (("%", one.shares), ("", one.numbers))
         for name, meaning in named.items()
     ]
+    sent = [(f"`{one.name}`", one.program, one.writes) for one in exports()]
     rules = [(f"`{one.name}`", one.says) for one in protocols()]
     return "\n".join(
         [
@@ -215,6 +217,9 @@ def records_page() -> str:
             "Detections, ground truth and results. Without `--input-format` a format is told by its "
             "bytes, then by the\nend of the file's name, then by the look of its first line.\n",
             *_table(("format", "what", "what is read", "a run's tables"), read),
+            "## Exports\n",
+            "What `export --to` writes ([how](../guides/other-programs.md)).\n",
+            *_table(("export", "for", "what is written"), sent),
             "## Scores\n",
             *_table(("score", "unit", "meaning"), scores),
             "## Protocols\n",

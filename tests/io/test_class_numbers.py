@@ -9,7 +9,7 @@ import pytest
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.exports.cvat import write_cvat
+from jeat_graph.exporting.cvat import write_cvat
 from jeat_graph.io.tables.detections_io import read_detections
 from jeat_graph.io.tables.trajectories_io import read_trajectories
 from jeat_graph.io.tables.truth_io import read_truth

@@ -17,7 +17,7 @@ from road_scenes import camera
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.io.exports.ottrk import OttrkVideo, write_ottrk
+from jeat_graph.exporting.ottrk import OttrkVideo, write_ottrk
 from jeat_graph.road.camera import Georeference
 from jeat_graph.road.camera_file import write_camera
 from jeat_graph.road.exports.frames import read_road_frames

@@ -16,6 +16,8 @@ import numpy as np
 
 from jeat_graph.data.arrays import TextArray
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.exporting.record import ExportRequest, ExportTarget
+from jeat_graph.exporting.sources import FRAME_OPTIONS, picture_of, tables_at_frames
 from jeat_graph.io.files.atomic import atomic_path
 from jeat_graph.io.tables.by_frame import by_frame
 from jeat_graph.version import __version__
@@ -138,3 +140,20 @@ def _metadata(video: OttrkVideo, frames: int, classes: Sequence[str]) -> dict[st
             "tracker": {"name": "jeat-graph", "version": __version__},
         },
     }
+
+
+def _write(request: ExportRequest) -> str:
+    frames, rate_hz, said = tables_at_frames(request)
+    width, height = picture_of(request)
+    name = request.video or f"{Path(request.source).resolve().name}.mp4"
+    write_ottrk(frames, request.out, OttrkVideo(name, int(width), int(height), rate_hz, request.start or 0.0))
+    return said
+
+
+EXPORT = ExportTarget(
+    name="ottrk",
+    program="OTAnalytics",
+    writes="`.ottrk`: a run's boxes by frames of the video",
+    write=_write,
+    options=(*FRAME_OPTIONS, "video", "start"),
+)

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.exporting.record import ExportRequest, ExportTarget
+from jeat_graph.exporting.sources import FRAME_OPTIONS, tables_at_frames
 from jeat_graph.io.files.atomic import atomic_path
 from jeat_graph.io.files.zipped import LABELS, MEMBER
 from jeat_graph.io.tables.by_frame import by_frame
@@ -47,3 +49,18 @@ def write_cvat(table: Trajectories, path: str | Path, rate_hz: float, label: str
     with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(zipfile.ZipInfo(MEMBER, _DATE), "".join(lines))
         archive.writestr(zipfile.ZipInfo(LABELS, _DATE), "".join(f"{name}\n" for name in labels))
+
+
+def _write(request: ExportRequest) -> str:
+    frames, rate_hz, said = tables_at_frames(request)
+    write_cvat(frames, request.out, rate_hz)
+    return said
+
+
+EXPORT = ExportTarget(
+    name="cvat",
+    program="CVAT",
+    writes="`.zip` for its import as `MOT 1.1`",
+    write=_write,
+    options=FRAME_OPTIONS,
+)

@@ -12,6 +12,8 @@ import numpy as np
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.exporting.record import ExportRequest, ExportTarget
+from jeat_graph.exporting.sources import run_tables, said_of
 from jeat_graph.io.files.atomic import open_atomic
 
 
@@ -40,3 +42,20 @@ def write_tum(table: Trajectories, track_id: int, path: str | Path) -> None:
             file.write(
                 " ".join(f"{value:.9g}" if k else f"{value:.9f}" for k, value in enumerate(pose)) + "\n"
             )
+
+
+def _write(request: ExportRequest) -> str:
+    tables = run_tables(request)
+    if request.track is None:
+        raise DataError("--to tum writes one trajectory: say which with --track ID")
+    write_tum(next(iter(tables.values())), request.track, request.out)
+    return said_of(tables)
+
+
+EXPORT = ExportTarget(
+    name="tum",
+    program="evo and other tools for single trajectories",
+    writes="`.txt`: the poses of one track",
+    write=_write,
+    options=("only", "track"),
+)

@@ -8,6 +8,8 @@ import numpy as np
 
 from jeat_graph.data.tables.frame_filling import check_rate
 from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.exporting.record import ExportRequest, ExportTarget
+from jeat_graph.exporting.sources import FRAME_OPTIONS, picture_of, tables_at_frames
 from jeat_graph.io.exports.coco_writer import coco_annotations, coco_categories, coco_images, write_coco
 from jeat_graph.io.tables.by_frame import by_frame
 
@@ -53,3 +55,19 @@ def write_coco_tracks(
         annotation["score"] = round(existence, 6)
         del annotation["visible"]  # of the truth alone
     write_coco(path, images, boxes, coco_categories(names if len(names) else [label]))
+
+
+def _write(request: ExportRequest) -> str:
+    frames, rate_hz, said = tables_at_frames(request)
+    width, height = picture_of(request)
+    write_coco_tracks(frames, request.out, rate_hz, (round(width), round(height)))
+    return said
+
+
+EXPORT = ExportTarget(
+    name="coco",
+    program="COCO tools",
+    writes="`.json`: images, boxes with `track_id` and `score`, and categories",
+    write=_write,
+    options=FRAME_OPTIONS,
+)

@@ -1,0 +1,1 @@
+"""Runs, roads and sets for other programs: one module with one record each; `registry` finds them."""

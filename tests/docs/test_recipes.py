@@ -1,0 +1,148 @@
+"""The recipes of CONTRIBUTING, followed word by word in a copy: their tests, lint and types pass."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+_PACKAGE = ROOT / "jeat_graph"
+_TOP = ("filters", "association", "smoothers", "eval", "configs")
+_LEFT_OUT = ("__pycache__", ".git", ".venv", ".mypy_cache", ".ruff_cache", ".pytest_cache", "build")
+_FILE = re.compile(r"```python\n# (\S+\.py)\n(.*?)```", re.DOTALL)
+
+
+def recipes() -> dict[str, str]:
+    """Text of each file that CONTRIBUTING says to write, by its path."""
+    return dict(_FILE.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """A copy in which the recipes were followed; what they do not touch is linked."""
+    root = tmp_path_factory.mktemp("checkout")
+    touched = {Path(name).parts for name in recipes()}
+
+    def fill(source: Path, target: Path, at: tuple[str, ...]) -> None:
+        target.mkdir()
+        for one in source.iterdir():
+            within = (*at, one.name)
+            if one.name in ("__pycache__", ".git", ".venv") or one.name.startswith(
+                (".mypy", ".ruff", ".pytest")
+            ):
+                continue
+            if one.is_dir() and any(parts[: len(within)] == within for parts in touched):
+                fill(one, target / one.name, within)
+            else:
+                (target / one.name).symlink_to(one)
+
+    fill(ROOT, root / "it", ())
+    for name, text in recipes().items():
+        path = root / "it" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return root / "it"
+
+
+def run(copy: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    """Run a program in the copy, on its packages."""
+    environment = {**os.environ, "PYTHONPATH": f"{copy}{os.pathsep}{copy / 'sehn'}"}
+    return subprocess.run(
+        [sys.executable, "-m", *command],
+        cwd=copy,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_there_is_a_recipe_and_a_test_of_a_format_an_export_and_a_metric():
+    folders = [str(Path(name).parent) for name in recipes()]
+    assert {"jeat_graph/io/formats", "jeat_graph/exporting", "eval/scores"} < set(folders)
+    assert sum(folder.startswith("tests/") for folder in folders) == 3
+
+
+def test_their_tests_pass(copy):
+    own = [name for name in recipes() if name.startswith("tests/")]
+    done = run(copy, "pytest", "-q", "-n", "0", "-p", "no:randomly", "-p", "no:cacheprovider", *own)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    assert done.stdout.startswith("....")  # four of them, and none is left out
+
+
+def test_their_page_is_made_anew(copy):
+    """The page of the copy names the new format, export and score; nothing else had to be told of them."""
+    code = (
+        "import sys; sys.path.insert(0, 'docs/_ext'); import generated_reference as made; "
+        "print(made.records_page())"
+    )
+    environment = {**os.environ, "PYTHONPATH": f"{copy}{os.pathsep}{copy / 'sehn'}"}
+    page = subprocess.run(
+        [sys.executable, "-c", code], cwd=copy, env=environment, capture_output=True, text=True, check=True
+    ).stdout
+    assert all(f"| `{name}` |" in page for name in ("semicolons", "lifetimes", "crowding"))
+
+
+def test_lint_passes(copy):
+    files = list(recipes())
+    for command in (("ruff", "check", "--no-cache"), ("ruff", "format", "--no-cache", "--check")):
+        done = run(copy, *command, *files)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_types_pass(copy):
+    pytest.importorskip("mypy")
+    package = copy.parent / "typed" / "jeat_graph"
+    package.mkdir(parents=True)
+    for one in (copy / "jeat_graph").iterdir():
+        (package / one.name).symlink_to(one)
+    for name in _TOP:
+        (package / name).symlink_to(copy / name)
+    modules = [
+        name.removesuffix(".py").replace("/", ".") for name in recipes() if not name.startswith("tests/")
+    ]
+    modules = [name if name.startswith("jeat_graph.") else f"jeat_graph.{name}" for name in modules]
+    flags = ["--config-file", str(ROOT / "pyproject.toml"), "--cache-dir", str(copy.parent / "cache")]
+    done = subprocess.run(
+        [sys.executable, "-m", "mypy", *flags, *(flag for name in modules for flag in ("-m", name))],
+        cwd=package.parent,
+        env={**os.environ, "PYTHONPATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert not [
+        line for line in done.stdout.splitlines() if any(Path(name).name in line for name in recipes())
+    ]
+    shutil.rmtree(copy.parent / "cache", ignore_errors=True)
+
+
+#: Words that are names of formats, exports, metrics or protocols and common words of this code too.
+_COMMON = {"csv", "parquet", "plain", "identity", "clear", "rerun"}
+
+
+def test_no_other_file_names_a_format_an_export_a_metric_or_a_protocol():
+    """Their names stand in their own file alone, so that whoever adds one has to look nowhere else."""
+    from jeat_graph.eval.metrics import metrics
+    from jeat_graph.eval.protocols.registry import protocols
+    from jeat_graph.exporting.registry import exports
+    from jeat_graph.io.formats.registry import formats
+
+    own = [ROOT / "eval" / "scores", ROOT / "eval" / "protocols"]
+    own += [_PACKAGE / "exporting", _PACKAGE / "io" / "formats"]
+    names = {one.name for found in (formats(), exports(), metrics(), protocols()) for one in found} - _COMMON
+    quoted = re.compile("|".join(rf"[\"']{re.escape(name)}[\"']" for name in sorted(names)))
+    files = [path for folder in (_PACKAGE, *(ROOT / name for name in _TOP)) for path in folder.rglob("*.py")]
+    found = {
+        path.relative_to(ROOT).as_posix(): quoted.findall(path.read_text(encoding="utf-8"))
+        for path in files
+        if not any(path.is_relative_to(folder) for folder in own)
+    }
+    assert {name: words for name, words in found.items() if words} == {}
