@@ -67,6 +67,7 @@ TERMS: dict[str, dict[str, Any]] = {
         "stationary_unseen_bounds": (_NEVER, _NEVER),
     },
     "false objects that two sensors share": {"shared_false": _NEVER},
+    "scores that other sensors contradict": {"agreed_std": _FIRM},
     "second boxes": {"duplicate_weight": 0.0},
     "a track's own P_D": {"p_detect_strength": _FIRM},
     "learnt ends of gaps": {"gap_prior_count": _FIRM},

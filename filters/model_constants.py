@@ -84,6 +84,7 @@ class ModelConstants:
         shared_false: share of persistent false objects that another sensor reports, too.
         noise_share: prior odds of noise that is seen once, as a probability. Prior.
         noise_bounds: of the learnt share.
+        agreed_std: standard deviation of a sensor's scores of tracks that others find too (logits). Prior.
         sensor_count: objects that the priors of shares count for.
         weight_hits, weight_bounds: a track's weight in a sensor's prior odds: detections over the first,
         bounded.
@@ -200,6 +201,7 @@ class ModelConstants:
     shared_false: float = 0.3
     noise_share: float = 0.5
     noise_bounds: tuple[float, float] = (0.05, 0.95)
+    agreed_std: float = 1.0
     sensor_count: float = 5.0
     weight_hits: float = 4.0
     weight_bounds: tuple[float, float] = (0.25, 5.0)

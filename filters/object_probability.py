@@ -54,6 +54,9 @@ class SensorBelief(NamedTuple):
         stationary_unseen: (S,) share b of the others that it does not see while they stand.
         indifference: (S,) a: logit + a is the log odds that a box is real.
         prior_odds: (S,) π: log odds that what it finds is real; shares how often "false" explains a find.
+        agreed_mean, agreed_std: (S,) mean and standard deviation of its scores (logits) of tracks that
+            another sensor finds as well.
+        agreed_share: (S,) how far these are believed, 0 before any.
         noise_share: prior share ν of noise among what is not real.
     """
 
@@ -62,6 +65,9 @@ class SensorBelief(NamedTuple):
     stationary_unseen: FloatArray
     indifference: FloatArray
     prior_odds: FloatArray
+    agreed_mean: FloatArray
+    agreed_std: FloatArray
+    agreed_share: FloatArray
     noise_share: float
 
 
@@ -117,7 +123,9 @@ def initial_sensor(c: ModelConstants) -> SensorBelief:
     """Return the model of one sensor before anything is learnt."""
     one = np.ones(1)
     shares = c.p_detect * one, c.unseen_share * one, c.stationary_unseen_share * one
-    return SensorBelief(*shares, 0.0 * one, 0.0 * one, c.noise_share)
+    return SensorBelief(
+        *shares, 0.0 * one, 0.0 * one, 0.0 * one, c.agreed_std * one, 0.0 * one, c.noise_share
+    )
 
 
 def beta_binomial(
@@ -129,10 +137,43 @@ def beta_binomial(
 
 
 def score_log_odds(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> FloatArray:
-    """Return η (N, S): a plus a mean of the peak and of the mean logit, once a track; 0 where never found."""
+    """Return η (N, S): a plus the track's score, once a track, times `testimony`; 0 where never found."""
+    score = track_scores(evidence, c)
+    given = sensors.indifference + score
+    weighed = np.where(given > 0.0, given * testimony(evidence, score, sensors, c), given)
+    return np.where(evidence.found, weighed, 0.0)
+
+
+def track_scores(evidence: Evidence, c: ModelConstants) -> FloatArray:
+    """Return z (N, S): a mean of peak and mean logit of each sensor's boxes; 0 where never found."""
     mean = evidence.total / np.maximum(evidence.total_weight, _LEAST_WEIGHT)
-    score = c.peak_share * evidence.peak + (1.0 - c.peak_share) * mean
-    return np.where(evidence.found, sensors.indifference + np.where(evidence.found, score, 0.0), 0.0)
+    return np.where(evidence.found, c.peak_share * evidence.peak + (1.0 - c.peak_share) * mean, 0.0)
+
+
+def testimony(evidence: Evidence, score: FloatArray, sensors: SensorBelief, c: ModelConstants) -> FloatArray:
+    """Return the weight (N, S) of each sensor's scores z (N, S).
+
+    A good score that the others contradict says as much as it resembles the scores of tracks that they found
+    too: with t standard deviations below the mean of those the weight is 1 − ψ (1 − e^(−t²/2)), ψ the share
+    to which they are believed times the probability that the others, which looked, do not see the track.
+    (Dawid and Skene, "Maximum likelihood estimation of observer error-rates", Applied Statistics 28, 1979:
+    observers are known by how they agree, without any truth. No label was made by a sensor's own scores.)
+    """
+    forgiven = sensors.stationary_unseen * evidence.stationary_misses
+    blind = 2.0 * blindness(evidence.hits, evidence.misses - forgiven, sensors, c) - 1.0
+    below = np.maximum(sensors.agreed_mean - score, 0.0) / sensors.agreed_std
+    doubt = sensors.agreed_share * (1.0 - np.exp(-0.5 * below**2))
+    for s in range(score.shape[1]):
+        others = np.delete(blind, s, axis=1)
+        alone = (1.0 - np.maximum(-others, 0.0)).prod(axis=1)
+        doubt[:, s] *= alone * np.maximum(others.max(axis=1, initial=0.0), 0.0)
+    return 1.0 - doubt
+
+
+def blindness(hits: FloatArray, misses: FloatArray, sensors: SensorBelief, c: ModelConstants) -> FloatArray:
+    """Return the probability (N, S) that a sensor does not see a track, by its looks (N, S) and even odds."""
+    seen = beta_binomial(hits, misses, sensors.p_detect, c)
+    return np.asarray(expit(_by_chance(hits, misses, c) - seen))
 
 
 def duplicate_log_odds(overlap: FloatArray, scores: FloatArray, c: ModelConstants) -> FloatArray:
@@ -255,6 +296,7 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
     stood = evidence.stationary_hits + evidence.stationary_misses
     grown = (evidence.last_s > evidence.born_s) | (evidence.gained > 0.0)
     told = grown | (evidence.misses.sum(axis=1) > _LEAST_MISSES)
+    score = track_scores(evidence, c)
     trust = evidence.found * np.clip(evidence.detections / c.weight_hits, *c.weight_bounds)[:, None]
     for _ in range(_ROUNDS):
         belief = posterior(evidence, sensors, c)
@@ -272,15 +314,39 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
         odds = ((trust * real).sum(axis=0) + c.sensor_count) / (
             (trust * (1.0 - real)).sum(axis=0) + c.sensor_count
         )
+        agreed = _agreed_scores(evidence, score, sensors, c)
         sensors = SensorBelief(
             p_detect=np.clip(p_detect, *c.p_detect_bounds),
             unseen=np.clip(unseen, *c.unseen_bounds),
             stationary_unseen=np.clip(stationary, *c.stationary_unseen_bounds),
             indifference=sensors.indifference,
             prior_odds=np.log(odds),
+            agreed_mean=agreed[0],
+            agreed_std=agreed[1],
+            agreed_share=agreed[2],
             noise_share=float(np.clip(noise, *c.noise_bounds)),
         )
     return sensors
+
+
+def _agreed_scores(
+    evidence: Evidence, score: FloatArray, sensors: SensorBelief, c: ModelConstants
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return mean and standard deviation of each sensor's scores (S,) where others agree, and their share."""
+    sees = (evidence.hits > 0.0) * (1.0 - blindness(evidence.hits, evidence.misses, sensors, c))
+    weight = sees * np.minimum(1.0, evidence.hits / _LEAST_LOOKS)
+    for s in range(score.shape[1]):
+        weight[:, s] *= np.delete(sees, s, axis=1).max(axis=1, initial=0.0)
+    total = weight.sum(axis=0)
+    known = total > 0.0
+    mean = (weight * score).sum(axis=0) / np.where(known, total, 1.0)
+    squares = np.maximum((weight * score**2).sum(axis=0) - total * mean**2, 0.0)
+    std = np.sqrt((c.sensor_count * c.agreed_std**2 + squares) / (c.sensor_count + total))
+    return (
+        np.where(known, mean, sensors.agreed_mean),
+        np.where(known, std, sensors.agreed_std),
+        np.where(known, total / (total + c.sensor_count), sensors.agreed_share),
+    )
 
 
 def _share(hits: FloatArray, of: FloatArray, prior: float, count: float) -> FloatArray:

@@ -208,7 +208,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         camera=camera_motion.initial_variance(c),
         camera_velocity=CameraVelocity.none(),
         gaps=gap_survival.no_gaps(),
-        sensors=SensorBelief(none, none, none, none, none, c.noise_share),
+        sensors=SensorBelief(none, none, none, none, none, none, none, none, c.noise_share),
         ended=Evidence.none(0),
         learnt_s=-math.inf,
         offsets=sensor_offsets.no_offsets(),
@@ -227,10 +227,8 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
 def declare_sensor(state: ReferenceState, c: ModelConstants, even_logit: float = math.nan) -> None:
     """Add a sensor that has not looked yet, of which what is usual is believed but for what the user says."""
     new, old = object_probability.initial_sensor(c), state.sensors
-    p_detect, unseen, stationary, indifference, odds = (
-        np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True)
-    )
-    state.sensors = SensorBelief(p_detect, unseen, stationary, indifference, odds, old.noise_share)
+    columns = (np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True))
+    state.sensors = SensorBelief(*columns, noise_share=old.noise_share)
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
     state.offsets = sensor_offsets.widened(state.offsets)
     state.log_side_variance = np.append(state.log_side_variance, 2.0 * math.log(c.side_std))

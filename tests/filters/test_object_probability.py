@@ -51,9 +51,16 @@ def evidence_of(hits, misses, scores, owner=0, gained=0.0, overlap=0.0, detectio
 
 
 def sensors_of(
-    number, p_detect=0.7, unseen=0.1, indifference=-1.0, prior_odds=0.3, noise=0.5, stationary_unseen=0.3
+    number,
+    p_detect=0.7,
+    unseen=0.1,
+    indifference=-1.0,
+    prior_odds=0.3,
+    noise=0.5,
+    stationary_unseen=0.3,
+    agreed=0.0,
 ):
-    values = (p_detect, unseen, stationary_unseen, indifference, prior_odds)
+    values = (p_detect, unseen, stationary_unseen, indifference, prior_odds, 3.0, 0.8, agreed)
     rows = [np.full(number, value) for value in values]
     return op.SensorBelief(*rows, noise_share=noise)
 
@@ -80,7 +87,7 @@ def enumerated(evidence, sensors):
     # The detection that began the track is a look at which it was found by chance, not because it is seen.
     born = [C.chance_hit / sensors.p_detect[s] if s == evidence.owner[0] else 1.0 for s in range(S)]
     moved = [hits[s] > stood[0][s] or misses[s] > stood[1][s] for s in range(S)]
-    odds = [np.exp(sensors.indifference[s] + evidence.peak[0, s]) if found[s] else 1.0 for s in range(S)]
+    odds = [np.exp(weighed_by_hand(evidence, sensors, s)) if found[s] else 1.0 for s in range(S)]
     prior = [np.exp(sensors.prior_odds[s]) if found[s] else 1.0 for s in range(S)]
     real = 0.0
     for sees in product(["always", "moving", "never"], repeat=S):
@@ -116,6 +123,24 @@ def enumerated(evidence, sensors):
     return real / (real + false + noise)
 
 
+def weighed_by_hand(evidence, sensors, s):
+    """Log odds by the scores of a sensor: what others contradict and is unlike agreed scores says little."""
+    z, hits, misses = evidence.peak[0, s], evidence.hits[0], evidence.misses[0]
+    given = sensors.indifference[s] + z
+    if given <= 0.0:
+        return given
+    alone, silent = 1.0, 0.0
+    for o in set(range(len(hits))) - {s}:
+        m = misses[o] - sensors.stationary_unseen[o] * evidence.stationary_misses[0, o]
+        chance = C.chance_hit ** hits[o] * (1 - C.chance_hit) ** m
+        blind = chance / (chance + marginal(hits[o], m, sensors.p_detect[o]))
+        alone *= min(1.0, 2.0 * blind)
+        silent = max(silent, 2.0 * blind - 1.0)
+    alike = np.exp(-0.5 * (max(sensors.agreed_mean[s] - z, 0.0) / sensors.agreed_std[s]) ** 2)
+    return given * (1.0 - alone * silent * sensors.agreed_share[s] * (1.0 - alike))
+
+
+@pytest.mark.parametrize("agreed", [0.0, 0.8])
 @pytest.mark.parametrize(
     ("hits", "misses", "scores"),
     [
@@ -124,13 +149,14 @@ def enumerated(evidence, sensors):
         ([1.0, 0.0], [0.0, 2.0], [2.0, np.nan]),
         ([1.0, 2.0], [0.5, 0.5], [0.5, -0.5]),
         ([4.0, 0.3, 0.0], [1.0, 2.0, 3.0], [1.5, 0.2, np.nan]),
+        ([4.0, 0.0], [1.0, 3.0], [1.9, np.nan]),
     ],
 )
 @pytest.mark.parametrize("gained", [0.0, 3.0])
 @pytest.mark.parametrize("stood", [0.0, 0.4, 1.0])
-def test_posterior_is_the_enumeration_of_hypotheses(hits, misses, scores, gained, stood):
+def test_posterior_is_the_enumeration_of_hypotheses(hits, misses, scores, gained, stood, agreed):
     evidence = evidence_of(hits, misses, scores, gained=gained, stood=stood)
-    sensors = sensors_of(len(hits))
+    sensors = sensors_of(len(hits), agreed=agreed)
     assert op.posterior(evidence, sensors, C).real[0] == pytest.approx(
         enumerated(evidence, sensors), rel=1e-6
     )
@@ -256,6 +282,28 @@ def test_one_lone_box_of_a_sensor_is_no_free_chance_hit():
             while_still = 0.6 * C.chance_hit * (1 - C.chance_hit) ** 9 * of_birth
             seen = 0.6 * (0.4 * marginal(1.0, 9.0, believed.p_detect[0]) + while_still)
         assert lone.unseen[0, 0] == pytest.approx(blind / (blind + seen), rel=1e-6)
+
+
+def test_a_good_score_that_others_contradict_says_little_where_it_is_unlike_those_they_agree_with():
+    """A second detector's still false things: scores of .87, and of .97 of what the first finds as well."""
+    both = evidence_of([9.0, 9.0], [1.0, 1.0], [2.5, 3.4], gained=20.0)
+    evidence = both
+    for _ in range(20):
+        evidence = evidence.append(both)
+    false = evidence_of([0.0, 30.0], [40.0, 6.0], [np.nan, 1.9], owner=1, gained=60.0)
+    believed = sensors_of(2, indifference=0.45, unseen=C.unseen_share, prior_odds=0.0)
+    assert op.posterior(false, believed, C).real[0] > 0.6
+    learnt = op.learn_sensors(evidence.append(false), believed, C)
+    assert learnt.agreed_mean[1] == pytest.approx(3.4, abs=1e-6)
+    assert learnt.agreed_std[1] == pytest.approx(np.sqrt(5 / (5 + 21)), rel=0.02)
+    told = learnt._replace(prior_odds=np.zeros(2), unseen=believed.unseen)
+    assert op.posterior(false, told, C).real[0] < 0.5
+    # What looks like theirs keeps its say, and so does what a single sensor finds where there is no other.
+    alike = evidence_of([0.0, 30.0], [40.0, 6.0], [np.nan, 3.4], owner=1, gained=60.0)
+    weights = op.testimony(alike, op.track_scores(alike, C), learnt, C)
+    assert weights[0, 1] == 1.0
+    alone = op.learn_sensors(evidence_of([9.0], [1.0], [2.5], gained=20.0), sensors_of(1), C)
+    assert alone.agreed_share[0] == 0.0
 
 
 def test_scores_count_once_a_track_however_often_it_is_found():

@@ -81,6 +81,7 @@ struct Bounds {
     JEAT_ONE(shared_false) \
     JEAT_ONE(noise_share) \
     JEAT_PAIR(noise_bounds) \
+    JEAT_ONE(agreed_std) \
     JEAT_ONE(sensor_count) \
     JEAT_ONE(weight_hits) \
     JEAT_PAIR(weight_bounds) \

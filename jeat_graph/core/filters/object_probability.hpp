@@ -15,7 +15,7 @@ inline constexpr int kRounds = 2;
 inline constexpr double kLeastMisses = 0.2, kLeastLooks = 1.0;
 
 struct SensorBelief {
-    std::vector<double> p_detect, unseen, stationary_unseen, indifference, prior_odds;
+    std::vector<double> p_detect, unseen, stationary_unseen, indifference, prior_odds, agreed_mean, agreed_std, agreed_share;
     double noise_share;
 
     void widen(const ModelConstants& c) {
@@ -24,6 +24,9 @@ struct SensorBelief {
         stationary_unseen.push_back(c.stationary_unseen_share);
         indifference.push_back(0.0);
         prior_odds.push_back(0.0);
+        agreed_mean.push_back(0.0);
+        agreed_std.push_back(c.agreed_std);
+        agreed_share.push_back(0.0);
     }
 };
 
@@ -82,7 +85,7 @@ public:
             }
             const bool found = e.found[first + s];
             const double prior = found ? sensors_.prior_odds[s] : 0.0;
-            scores_[s] = found ? sensors_.indifference[s] + score(e, first + s) : 0.0;
+            scores_[s] = found ? weighed_score(e, row, s) : 0.0;
             // Scores of what a sensor finds by chance are those of clutter; but a track does not begin by chance.
             const double never = log_unseen_[s] + chance + (began ? scores_[s] : 0.0) + birth;
             const double object = log_add(never, log_not_unseen_[s] + sees + scores_[s]);
@@ -105,11 +108,36 @@ public:
         return out_;
     }
 
-private:
+    // A track's score by a sensor, once a track.
     double score(const Evidence& e, std::size_t at) const {
         const double mean = e.total[at] / std::max(e.total_weight[at], kLeastSum);
         return c_.peak_share * e.peak[at] + (1.0 - c_.peak_share) * mean;
     }
+    // Probability that a sensor does not see a track, by its looks and even odds; some misses may be forgiven.
+    double blindness(const Evidence& e, std::size_t at, std::size_t s, double forgiven) const {
+        const double h = e.hits[at], m = e.misses[at] - forgiven;
+        const double seen = log_beta(a_[s] + h, b_[s] + m) - log_beta_[s];
+        return expit(h * log_chance_ + m * log_no_chance_ - seen);
+    }
+
+private:
+    // A good score that the others contradict says as much as it resembles the scores that they agree with.
+    double weighed_score(const Evidence& e, std::size_t row, std::size_t s) const {
+        const std::size_t first = row * e.sensors;
+        const double z = score(e, first + s), given = sensors_.indifference[s] + z;
+        const double below = (sensors_.agreed_mean[s] - z) / sensors_.agreed_std[s];
+        if (!(given > 0.0) || !(sensors_.agreed_share[s] > 0.0) || !(below > 0.0)) return given;
+        double alone = 1.0, silent = 0.0;
+        for (std::size_t o = 0; o < e.sensors; ++o) {
+            if (o == s) continue;
+            const double forgiven = sensors_.stationary_unseen[o] * e.stationary_misses[first + o];
+            const double blind = 2.0 * blindness(e, first + o, o, forgiven) - 1.0;
+            alone *= 1.0 - std::max(-blind, 0.0);
+            silent = std::max(silent, blind);
+        }
+        return given * (1.0 - sensors_.agreed_share[s] * (1.0 - exp_of(-0.5 * below * below)) * alone * silent);
+    }
+
 
     const SensorBelief& sensors_;
     const ModelConstants& c_;
@@ -122,11 +150,12 @@ private:
 // Sums over tracks from which the sensors are learnt.
 struct SensorSums {
     std::vector<double> hits, looks, unseen, seeable, stationary_unseen, stationary, real, not_real;
+    std::vector<double> agreed, agreed_score, agreed_square, sees;
     double noise = 0.0, not_object = 0.0;
 
     explicit SensorSums(std::size_t S)
         : hits(S, 0.0), looks(S, 0.0), unseen(S, 0.0), seeable(S, 0.0), stationary_unseen(S, 0.0), stationary(S, 0.0),
-          real(S, 0.0), not_real(S, 0.0) {}
+          real(S, 0.0), not_real(S, 0.0), agreed(S, 0.0), agreed_score(S, 0.0), agreed_square(S, 0.0), sees(S, 0.0) {}
 
     void add(const Evidence& e, PosteriorRule& rule, const ModelConstants& c) {
         for (std::size_t row = 0; row < e.size(); ++row) {
@@ -156,11 +185,30 @@ struct SensorSums {
                     not_real[s] += trust * (1.0 - p);
                 }
             }
+            add_agreed(e, row, rule);
             const bool grown = e.last_s[row] > e.born_s[row] || e.gained[row] > 0.0;
             if (grown || missed > kLeastMisses) {
                 noise += (1.0 - p) * belief.noise;
                 not_object += 1.0 - p;
             }
+        }
+    }
+
+    // The scores of a track that another sensor finds as well.
+    void add_agreed(const Evidence& e, std::size_t row, const PosteriorRule& rule) {
+        const std::size_t first = row * e.sensors;
+        for (std::size_t s = 0; s < e.sensors; ++s)
+            sees[s] = e.hits[first + s] > 0.0 ? 1.0 - rule.blindness(e, first + s, s, 0.0) : 0.0;
+        for (std::size_t s = 0; s < e.sensors; ++s) {
+            double others = 0.0;
+            for (std::size_t o = 0; o < e.sensors; ++o)
+                if (o != s) others = std::max(others, sees[o]);
+            if (!(e.found[first + s] && others > 0.0)) continue;
+            const double weight = others * sees[s] * std::min(1.0, e.hits[first + s] / kLeastLooks);
+            const double z = rule.score(e, first + s);
+            agreed[s] += weight;
+            agreed_score[s] += weight * z;
+            agreed_square[s] += weight * z * z;
         }
     }
 };
@@ -185,6 +233,13 @@ inline void learn_sensors(const Evidence& ended, const Evidence& living, SensorB
             next.stationary_unseen[s] = clamp(
                 beta_share(sums.stationary_unseen[s], sums.stationary[s], c.stationary_unseen_share, c.sensor_count),
                 c.stationary_unseen_bounds.low, c.stationary_unseen_bounds.high);
+            if (const double known = sums.agreed[s]; known > 0.0) {
+                const double mean = sums.agreed_score[s] / known, count = c.sensor_count;
+                const double squares = std::max(sums.agreed_square[s] - known * mean * mean, 0.0);
+                next.agreed_mean[s] = mean;
+                next.agreed_std[s] = std::sqrt((count * c.agreed_std * c.agreed_std + squares) / (count + known));
+                next.agreed_share[s] = known / (known + count);
+            }
             next.prior_odds[s] = log_of((sums.real[s] + c.sensor_count) / (sums.not_real[s] + c.sensor_count));
         }
         next.noise_share = clamp(beta_share(sums.noise, sums.not_object, c.noise_share, c.sensor_count),

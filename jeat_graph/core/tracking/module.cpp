@@ -227,6 +227,9 @@ public:
         out["p_detect"] = array_of(state.belief.p_detect);
         out["unseen"] = array_of(state.belief.unseen);
         out["stationary_unseen"] = array_of(state.belief.stationary_unseen);
+        out["agreed_mean"] = array_of(state.belief.agreed_mean);
+        out["agreed_std"] = array_of(state.belief.agreed_std);
+        out["agreed_share"] = array_of(state.belief.agreed_share);
         out["indifference"] = array_of(state.belief.indifference);
         out["prior_odds"] = array_of(state.belief.prior_odds);
         std::vector<double> leftovers;

@@ -197,7 +197,11 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     auto& [gaps_ended, ended_well] = gaps;
     v.numbers("gaps.ended", gaps_ended.data(), gaps_ended.size());
     v.numbers("gaps.ended_well", ended_well.data(), ended_well.size());
-    auto& [p_detect, unseen, stationary_unseen, indifference, prior_odds, noise_share] = belief;
+    auto& [p_detect, unseen, stationary_unseen, indifference, prior_odds, agreed_mean, agreed_std, agreed_share, noise_share] =
+        belief;
+    v.column("belief.agreed_mean", agreed_mean, S, 1);
+    v.column("belief.agreed_std", agreed_std, S, 1);
+    v.column("belief.agreed_share", agreed_share, S, 1);
     v.column("belief.p_detect", p_detect, S, 1);
     v.column("belief.unseen", unseen, S, 1);
     v.column("belief.stationary_unseen", stationary_unseen, S, 1);
@@ -383,6 +387,8 @@ inline void check_state(const State& state, const Answer& answer) {
     shares("belief.p_detect", state.belief.p_detect);
     shares("belief.unseen", state.belief.unseen);
     shares("belief.stationary_unseen", state.belief.stationary_unseen);
+    shares("belief.agreed_share", state.belief.agreed_share);
+    for (const double std : state.belief.agreed_std) StateReader::require(std > 0.0, "belief.agreed_std", "is none");
 }
 
 inline void check_histories(Histories& histories, const State& state, bool smooths) {
