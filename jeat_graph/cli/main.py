@@ -41,6 +41,7 @@ COMMANDS = (
     "draw",
     "frame",
     "count",
+    "recount",
     "camera",
     "road",
     "handover",

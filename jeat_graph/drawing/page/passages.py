@@ -35,7 +35,7 @@ class Passed(NamedTuple):
     kmh: float
 
 
-class Flow(NamedTuple):
+class OdFlow(NamedTuple):
     """How many went from one place to another; an empty destination is not known."""
 
     origin: str
@@ -44,7 +44,7 @@ class Flow(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Traffic:
+class CountedTraffic:
     """What is known of the traffic of a recording.
 
     Attributes:
@@ -60,7 +60,7 @@ class Traffic:
     passed: Sequence[Passed]
     span: tuple[float, float] | None = None
     zone: tzinfo | None = None
-    flows: Sequence[Flow] = ()
+    flows: Sequence[OdFlow] = ()
     left_out: dict[str, int] = field(default_factory=dict)
 
     def bounds(self) -> tuple[float, float]:
@@ -89,7 +89,7 @@ def is_traffic(source: Path) -> bool:
     return {"line", "track_id", "t", "direction"} <= {name.strip() for name in head}
 
 
-def read_traffic(source: Path, od: Path | None = None) -> Traffic:
+def read_traffic(source: Path, od: Path | None = None) -> CountedTraffic:
     """Read the vehicles at lines.
 
     Args:
@@ -115,7 +115,7 @@ def read_traffic(source: Path, od: Path | None = None) -> Traffic:
         speeds,
         strict=True,
     )
-    return Traffic(
+    return CountedTraffic(
         source.name or str(source),
         sorted((Passed(*row) for row in rows), key=lambda one: one.t),
         _span(source / "counts.csv") if source.is_dir() else None,
@@ -159,7 +159,7 @@ def _span(path: Path) -> tuple[float, float] | None:
     return (float(begins), float(ends)) if first != last else (float(start[first]), float(end[first]))
 
 
-def _flows(path: Path) -> list[Flow]:
+def _flows(path: Path) -> list[OdFlow]:
     table = read_table(path, ("origin", "destination", "count"))
     total: Counter[tuple[str, str]] = Counter()
     ways = zip(table.text("origin").tolist(), table.text("destination", blank_ok=True).tolist(), strict=True)
@@ -167,7 +167,7 @@ def _flows(path: Path) -> list[Flow]:
         if count < 0:
             raise DataError("has a negative count", path)
         total[way] += count
-    return [Flow(*way, count) for way, count in sorted(total.items()) if count]
+    return [OdFlow(*way, count) for way, count in sorted(total.items()) if count]
 
 
 def _left_out(path: Path) -> dict[str, int]:

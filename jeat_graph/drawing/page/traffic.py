@@ -12,7 +12,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.drawing.page.document import table_html
 from jeat_graph.drawing.page.head import page_head
-from jeat_graph.drawing.page.passages import Flow, Passed, Traffic
+from jeat_graph.drawing.page.passages import CountedTraffic, OdFlow, Passed
 from jeat_graph.eval.counting import LEAST_FLOW_S, interval_edges, observed_s, per_hour
 from jeat_graph.eval.tables import Cell, Table
 
@@ -30,7 +30,7 @@ _V85 = 0.85
 _LEAST_SPEEDS = 20
 
 
-def render_traffic(traffic: Traffic, interval_s: float) -> str:
+def render_traffic(traffic: CountedTraffic, interval_s: float) -> str:
     """Make the page; the same tables give the same bytes.
 
     Args:
@@ -55,7 +55,7 @@ def render_traffic(traffic: Traffic, interval_s: float) -> str:
     return "\n".join(part for part in parts if part) + "\n"
 
 
-def _line(traffic: Traffic, line: str, edges: FloatArray) -> str:
+def _line(traffic: CountedTraffic, line: str, edges: FloatArray) -> str:
     """Table by direction, class and interval, and the curve over the day."""
     own = [one for one in traffic.passed if one.line == line]
     ways = sorted({one.direction for one in own})
@@ -80,7 +80,7 @@ def _line(traffic: Traffic, line: str, edges: FloatArray) -> str:
     return f"<h2>Line {escape(line)}</h2>{table_html(table)}{_curve(traffic, curves, edges, line)}"
 
 
-def _curve(traffic: Traffic, curves: dict[str, list[float]], edges: FloatArray, line: str) -> str:
+def _curve(traffic: CountedTraffic, curves: dict[str, list[float]], edges: FloatArray, line: str) -> str:
     """Vehicles an hour over time, a step for each interval, a colour for each direction."""
     known = [value for values in curves.values() for value in values if math.isfinite(value)]
     if not known:
@@ -137,7 +137,7 @@ def v85(kmh: FloatArray) -> tuple[float, float, float]:
     return float(np.percentile(ordered, 100.0 * _V85)), *ends
 
 
-def _speeds(traffic: Traffic) -> str:
+def _speeds(traffic: CountedTraffic) -> str:
     """Distribution of speeds at each line and direction, with v85."""
     groups: dict[tuple[str, str], list[Passed]] = {}
     for one in traffic.passed:
@@ -189,7 +189,7 @@ def _histogram(kmh: FloatArray, value: float, label: str) -> str:
     return _svg(parts, _HEIGHT, label)
 
 
-def _od(flows: Sequence[Flow]) -> str:
+def _od(flows: Sequence[OdFlow]) -> str:
     """Ways between places: a band from each origin on the left to each destination on the right."""
     if not flows:
         return ""
@@ -235,7 +235,7 @@ def _od(flows: Sequence[Flow]) -> str:
     return f"<h2>Origin and destination</h2>{_svg(parts, height, 'Ways of vehicles, as wide as many')}{table}"
 
 
-def _left_out(traffic: Traffic) -> str:
+def _left_out(traffic: CountedTraffic) -> str:
     """What was left out, and why."""
     items = [f"{count} × {reason}" for reason, count in traffic.left_out.items()]
     unknown = sum(not math.isfinite(one.kmh) for one in traffic.passed)
