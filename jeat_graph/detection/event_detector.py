@@ -18,9 +18,11 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Scan
+from jeat_graph.data.events import EventArray
 from jeat_graph.detection.background import UsualActivity
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.components import Components, measured, weights, without_inner
+from jeat_graph.detection.lamps import Lamps
 from jeat_graph.detection.linking import MarkedPixels, linked, marked_pixels
 from jeat_graph.detection.memory import CloudMemory
 from jeat_graph.detection.settings import USUAL_RATE_HZ, EventSettings
@@ -52,10 +54,16 @@ class EventDetector(BinnedDetector):
         self._piece_steps = round(self.settings.pieces_s * self._rate_hz)
         self._near_px = max(2, round(self.settings.near_share * diagonal))
         self._memory = CloudMemory(self._near_px, self._steps, self._piece_steps)
+        self._lamps = Lamps(size_px) if self.settings.lamps else None
 
     def _emptied(self) -> None:
         self._background.forget()
         self._memory = CloudMemory(self._near_px, self._steps, self._piece_steps)
+
+    def _advance(self, events: EventArray) -> list[Scan]:
+        if self._lamps is not None:
+            self._lamps.watch(events)
+        return super()._advance(events)
 
     def _look(self) -> Scan:
         settings = self.settings
@@ -80,7 +88,8 @@ class EventDetector(BinnedDetector):
     def _clouds(self) -> Components:
         """Link the window's events; boxes from the newest part, weights from all."""
         settings = self.settings
-        pixels = marked_pixels(self._background.standing_out(self._bins.total))
+        total = self._bins.total if self._lamps is None else self._lamps.without(self._bins.total)
+        pixels = marked_pixels(self._background.standing_out(total))
         count, marked = linked(pixels, self._link_px(pixels), settings.least_events)
         count, marked = self._memory.relabel(count, marked)
         whole = weights(count, marked)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from jeat_graph.config.fields import Section, number
+from jeat_graph.config.fields import Section, flag, number
 from jeat_graph.config.section_tree import build, merge, read_tree, tree_of_changes
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.background import BackgroundSettings
@@ -69,6 +69,9 @@ class EventSettings(Section):
     certain_events: float = number(40.0, "1", "at so many events a score reaches 1 - 1/e", open_low=True)
     longest_gap_s: float = number(
         10.0, "s", "where the time of a file leaps ahead by more, no scans are made for the gap", 0.1
+    )
+    lamps: bool = flag(
+        True, "whether pixels of lamps that flicker with the mains, 100 or 120 times a second, are left out"
     )
     background: BackgroundSettings = field(default_factory=BackgroundSettings)
     # What stands out of the background is no event that stands alone.

@@ -5,6 +5,7 @@
 #include "arrays.hpp"
 #include "detection/background.hpp"
 #include "detection/components.hpp"
+#include "detection/flicker.hpp"
 #include "detection/linking.hpp"
 #include "detection/memory.hpp"
 #include "detection/noise.hpp"
@@ -244,6 +245,29 @@ void bind_noise(nb::module_& module) {
         },
         nb::arg("x").noconvert(), nb::arg("y").noconvert(), nb::arg("hot").noconvert(), nb::arg("good").noconvert(),
         "Mark the events that are in the picture (H, W) and not of hot pixels.");
+    module.def(
+        "leave_flicker",
+        [](In<std::int64_t> t, In<std::uint16_t> x, In<std::uint16_t> y, In<std::uint8_t> polarity,
+           Out2<std::int64_t> rise, Out2<std::uint8_t> state, std::tuple<std::int64_t, std::int64_t, std::int64_t, int> rule,
+           Out<bool> good) {
+            check_lengths({t.size(), x.size(), y.size(), polarity.size(), good.size()});
+            check(rise.shape(0) == state.shape(0) && rise.shape(1) == state.shape(1), "both are of the picture's size");
+            const auto [shortest, longest, forgotten, least] = rule;
+            check(least > 0 && least < 32, "it flickers after 1 to 31 periods");
+            const FlickerRule known{shortest, longest, forgotten, least};
+            const Places places{span(x), span(y)};
+            const auto times = span(t);
+            const auto signs = span(polarity);
+            const auto rises = view2(rise);
+            const auto states = view2(state);
+            const auto found = span(good);
+            const Release release;
+            leave_flicker(times, places, signs, rises, states, known, found);
+        },
+        nb::arg("t").noconvert(), nb::arg("x").noconvert(), nb::arg("y").noconvert(),
+        nb::arg("polarity").noconvert(), nb::arg("rise").noconvert(), nb::arg("state").noconvert(), nb::arg("rule"),
+        nb::arg("good").noconvert(),
+        "Unmark the events of pixels that flicker: `rise` (H, W; us) and `state` (H, W) are theirs.");
     module.def(
         "take_events",
         [](In<std::int64_t> t, In<std::uint16_t> x, In<std::uint16_t> y, In<std::uint8_t> polarity, In<bool> good) {
