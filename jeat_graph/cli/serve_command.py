@@ -17,7 +17,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--check",
         action="store_true",
-        help="only say whether the file is valid and the clients of its brokers are installed",
+        help="only say whether a start would succeed: build all that it would build (settings, detectors, "
+        "keys, folders) and ask nobody",
+    )
+    parser.add_argument(
+        "--connect",
+        action="store_true",
+        help="with --check: also connect to the brokers and cameras; a service that runs is not disturbed",
     )
     parser.add_argument(
         "--set-aside-damaged",
@@ -29,8 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal comes."""
+    from jeat_graph.data.errors import ConfigError
+    from jeat_graph.live.interrupts import Interrupts
+    from jeat_graph.live.service.checking import ask_others, check_start
     from jeat_graph.live.service.config import read_service
-    from jeat_graph.live.service.ends import check_packages
     from jeat_graph.live.service.log import WARNING, Log
     from jeat_graph.live.service.run import Service
 
@@ -38,8 +46,15 @@ def run(args: argparse.Namespace) -> int:
     log = Log(config.name)
     for text in warnings:
         log.write(WARNING, text)
+    if args.connect and not args.check:
+        raise ConfigError("--connect goes with --check: a start connects anyway")
     if args.check:
-        check_packages(config)
+        with Interrupts() as interrupts, log.of_libraries():
+            check_start(config, detectors=True)
+            if args.connect:
+                ask_others(config, log, lambda: interrupts.seen is not None)
+        if interrupts.seen is not None:
+            return 128 + interrupts.seen
         print(f"{args.service}: valid: {len(config.sources)} sources, {len(config.sinks)} sinks")
         return 0
     return Service(config, log, sets_aside_damaged=args.set_aside_damaged).run()

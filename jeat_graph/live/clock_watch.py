@@ -4,6 +4,9 @@ The latest detections of each sensor are kept. They are compared after 15, 30, 4
 own times, then ever more seldom, a few steps of the work with each message. Two comparisons in a row must say
 the same before anything is taken off. Nothing asks for the clock on the wall, or for how long the work takes:
 the same scans in the same order always give the same.
+
+A clock that was found, or that a rig gives, is compared again when it has stepped (`clock_steps`), and every
+ten minutes: so one that drifts is followed.
 """
 
 from __future__ import annotations
@@ -34,6 +37,8 @@ _FIRST_S, _EARLY, _MOST_BETWEEN_S = 15.0, 4, 3600.0
 _LOOKED_AT_S = 25.0
 # Steps of the work for each second that a sensor goes on, and at most with one message.
 _STEPS_A_SECOND, _MOST_STEPS = 250.0, 25
+#: Clocks that are known are compared again after so long (s), and then so often at most.
+AGAIN_S, _MOST_AGAIN = 600.0, _EARLY
 # Two comparisons say the same where they differ by no more than this, or so many standard deviations.
 _SAME_S, _SAME_STD = 0.005, 4.0
 # So many scans in a row that are far from the sensor's others are its new time.
@@ -85,8 +90,8 @@ class ClockWatch:
     """Watches the clocks of sensors that nobody has given.
 
     Args:
-        config: `input.clocks` says whether to look, `sensors` which clocks are given: a `clock` of any sensor
-            (a rig) ends the search, a `latency_s` that of this sensor.
+        config: `input.clocks` says whether to look, `sensors` which clocks are given: where any sensor has a
+            `clock` (a rig), all begin as known; one with a `latency_s` is never looked at.
 
     Attributes:
         clocks: by sensor what is taken off its times: `lag_s`, `std_s`, and `at_s`, the time of its scan at
@@ -95,12 +100,14 @@ class ClockWatch:
 
     def __init__(self, config: Config) -> None:
         self._jump_s = config.live.jump_s
-        given = any(sensor.clock is not None for sensor in config.sensors.values())
-        self._looks = config.input.clocks == "find" and not given
+        self._rig = any(sensor.clock is not None for sensor in config.sensors.values())
+        self._looks = config.input.clocks == "find"
         self._given = {name for name, sensor in config.sensors.items() if sensor.latency_s != 0.0}
         self.clocks: dict[str, dict[str, float]] = {}
         self._met: list[str] = []  # in order of their first scans
         self._settled: list[str] = []
+        self._again = False  # whether what is known is being compared again
+        self._settled_at: float | None = None  # newest time when all were known (s)
         self._told: list[str] = []
         self._heard: dict[str, _Heard] = {}
         self._compared = 0  # comparisons since somebody new was met, or a clock jumped
@@ -125,6 +132,7 @@ class ClockWatch:
         watched = [scan for scan in scans if scan.sensor not in self._given]
         self._meet(watched)
         if not self._waits_for_another() and len(self._settled) == len(self._met):
+            self._compare_again_in_time(watched)
             return None
         steps = sum(self._hear(scan) for scan in watched)
         if self._work is None and self._is_due():
@@ -146,10 +154,42 @@ class ClockWatch:
         for scan in scans:
             if scan.sensor not in self._met:
                 self._met.append(scan.sensor)
+                if self._rig:
+                    self._settled.append(scan.sensor)
+                    continue
                 self._compared, self._last = 0, {}
                 self._window, self._done, self._work = {}, 0, None
         if len(self._met) == 1 and not self._settled and not self._waits_for_another():
             self._settled = list(self._met)  # it is alone, and what it says is not kept any longer
+            self._begin_anew()
+
+    def stepped(self, sensor: str, step_s: float, std_s: float, at_s: float) -> FoundClock:
+        """Take a step of a sensor's clock off its times, and have that compared with the others' boxes.
+
+        Args:
+            sensor: whose.
+            step_s: by how much it is ahead (s), of times from which the clock's known offset is taken off.
+            std_s: how exactly that is known (s).
+            at_s: the sensor's time before (s).
+        """
+        before = self.lag_s(sensor)
+        self.clocks[sensor] = {"lag_s": round(before + step_s, 6), "std_s": std_s, "at_s": at_s}
+        self._begin_anew()
+        if sensor in self._settled and len(self._settled) > 1:
+            self._settled.remove(sensor)
+            self._again = True
+        return FoundClock(step_s, std_s, True)
+
+    def _compare_again_in_time(self, scans: Sequence[Scan]) -> None:
+        """Compare all with the first again, after a while."""
+        if len(self._met) < 2 or not scans:
+            return
+        t = max(scan.t for scan in scans)
+        if self._settled_at is None or not 0.0 <= t - self._settled_at <= AGAIN_S + WINDOW_S:
+            self._settled_at = t  # from here, or from here again after a leap
+        elif t - self._settled_at >= AGAIN_S:
+            self._settled_at = None
+            self._settled, self._again = self._settled[:1], True
             self._begin_anew()
 
     def _waits_for_another(self) -> bool:
@@ -189,7 +229,8 @@ class ClockWatch:
         return len(spans) > 1 and spans[-2] >= _due_s(self._compared)
 
     def _begin_work(self) -> None:
-        self._work = _compare_all(self._window, [name for name in self._met if name in self._settled])
+        settled = [name for name in self._met if name in self._settled]
+        self._work = _compare_all(self._window, settled, self._again)
 
     def _conclude(self, reference: str, compared: _Compared) -> ClockNews | None:
         """Say what a comparison comes to."""
@@ -211,6 +252,8 @@ class ClockWatch:
                     sure[name] = found
             elif found is not None:
                 lines += self._once(name, unsure_of(name, reference, found))
+        if self._again and not (agree or sure) and self._compared >= _MOST_AGAIN:
+            self._settled += [name for name in self._met if name not in self._settled]  # as they were
         newest = {name: one.newest for name, one in self._heard.items()}
         taken: dict[str, FoundClock] = {}
         if sure:
@@ -224,8 +267,9 @@ class ClockWatch:
         fresh = [name for name in (reference, *agree, *sure) if name not in self._settled]
         if agree or sure:
             self._settled += fresh
-            if taken or len(self._settled) == len(self._met):
-                self._begin_anew()
+        if taken or len(self._settled) == len(self._met):
+            self._begin_anew()
+            self._again = self._again and len(self._settled) < len(self._met)
         return ClockNews(taken, newest, lines) if taken or lines else None
 
     def _once(self, key: str, line: str) -> list[str]:
@@ -241,6 +285,8 @@ class ClockWatch:
             "clocks": self.clocks,
             "met": self._met,
             "settled": self._settled,
+            "again": self._again,
+            "settled_at": self._settled_at,
             "told": self._told,
             "heard": {name: one.state() for name, one in self._heard.items()},
             "compared": self._compared,
@@ -253,6 +299,7 @@ class ClockWatch:
         """Go on from what `state` returned: a comparison that had begun is done again up to there."""
         self.clocks = {name: dict(one) for name, one in state["clocks"].items()}
         self._met, self._settled = list(state["met"]), list(state["settled"])
+        self._again, self._settled_at = state["again"], state["settled_at"]
         self._told, self._compared = list(state["told"]), state["compared"]
         self._heard = {
             name: _Heard(one["begun"], deque(one["scans"]), one["odd"])
@@ -285,7 +332,7 @@ def _due_s(compared: int) -> float:
 
 
 def _compare_all(
-    window: Mapping[str, Sequence[Scan]], settled: Sequence[str]
+    window: Mapping[str, Sequence[Scan]], settled: Sequence[str], again: bool
 ) -> Generator[None, None, tuple[str, _Compared]]:
     """Compare each sensor whose clock is not known with that of most boxes, one that is known if any is."""
     recordings = {}
@@ -298,5 +345,7 @@ def _compare_all(
     for name, recording in recordings.items():
         if name != reference and name not in settled:
             pair = (reference, name)
-            compared[name] = yield from compare_in_steps(recordings[reference], recording, pair, _LOOKED_AT_S)
+            compared[name] = yield from compare_in_steps(
+                recordings[reference], recording, pair, _LOOKED_AT_S, exactly=again
+            )
     return reference, compared

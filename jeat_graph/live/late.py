@@ -20,12 +20,13 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.arrival import Admitted, Arrival, Taken, looked_last
+from jeat_graph.live.clock_steps import ClockSteps, Judged
 from jeat_graph.live.clock_watch import ClockNews, ClockWatch
 from jeat_graph.live.lateness import LatenessCounter
 from jeat_graph.live.repetition import Repetition
 from jeat_graph.live.rewinding import ReplayableStep, Rewinding
 from jeat_graph.live.time_base import Decision, TimeBase
-from jeat_graph.live.waiting import Released, WaitingRoom
+from jeat_graph.live.waiting import Released, WaitingRoom, by_time
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
@@ -88,6 +89,7 @@ class LiveTracker:
         self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
         self._common = CommonPicture.of(config)
         self._clocks = ClockWatch(config)
+        self._clock_steps = ClockSteps(config.live.late_s)
         self._room: WaitingRoom | None = None
         # Of the sensors that are declared or have been met: known delay of their times, most lateness (s).
         self._latency: dict[str, float] = {}
@@ -137,19 +139,56 @@ class LiveTracker:
         batch = [self._on_common_clock(scan) for scan in given]
         self.measured = []
         repeated, late, new = self._repetition.sort(batch, given, self._was_taken)
-        released = Released([new] if new else [], [])
+        judged = self._judge(new)
+        on = [*judged.released, *judged.take]
+        released = Released([*by_time(judged.released), *([judged.take] if judged.take else [])], [])
         if self._room is not None:
-            released = self._room.enter(new, self._base.bound_s)
+            released = self._room.enter(on, self._base.bound_s)
         admitted = [self._admit(scans) for scans in released.batches]
         self._repetition.note(given)  # what the tracker refuses has not come
         missed = [*released.missed, *late]
         for scan in missed:
             self.lateness.add(scan.sensor, max((self.time or 0.0) - scan.t, 0.0), True)
-        news = self._clocks.saw([scan for scan in batch if scan in new or scan in late])
+        news = self._clocks.saw([*on, *late])
         if news is not None and news.taken_off:
+            for name, found in news.taken_off.items():
+                self._clock_steps.corrected(name, found.lag_s)
             news.lines.extend(self._wait_for(news))
-        waiting = [] if self._room is None else [scan for scan in new if self._room.holds(scan)]
-        return self._arrival(admitted, repeated)._replace(waiting=waiting, missed=missed, clocks=news)
+        waiting = [] if self._room is None else [scan for scan in on if self._room.holds(scan)]
+        arrival = self._arrival(admitted, repeated)
+        return arrival._replace(
+            held=[*arrival.held, *judged.held],
+            refuted=[*judged.refuted, *arrival.refuted],
+            waiting=waiting,
+            missed=missed,
+            clocks=self._said_of_steps(judged, news),
+        )
+
+    def _judge(self, scans: list[Scan]) -> Judged:
+        """Look whether a clock has stepped; where late scans are refused, times are as they are."""
+        if self.policy == REFUSE or self.tracker.config.input.clocks != "find" or not scans:
+            return Judged(scans, [], [], [])
+        judged = self._clock_steps.saw(scans)
+        for scan in judged.refuted:
+            self.lateness.add(scan.sensor, 0.0, True)
+        return judged
+
+    def _said_of_steps(self, judged: Judged, news: ClockNews | None) -> ClockNews | None:
+        """Take steps of clocks off from now on, and add what is to be said of them to the other news."""
+        if judged.together:
+            line = f"warning: the clock of all sensors was set back by {judged.together:.3f} s"
+            news = news or ClockNews({}, {}, [])
+            news.lines.append(line)
+        for step in judged.steps:
+            found = self._clocks.stepped(*step)
+            news = news or ClockNews({}, {}, [])
+            news.taken_off[step.sensor] = found
+            news.lines.append(
+                f"warning: sensor {step.sensor!r}: its clock has leapt by {step.step_s:+.3f} s while the "
+                f"others went on; which is taken off, {self._clocks.lag_s(step.sensor):.4f} s in all "
+                "(--set input.clocks=as_given leaves them)"
+            )
+        return news
 
     def _admit(self, scans: list[Scan]) -> Admitted:
         """Take in scans that need not wait, as far as their times are believed."""
@@ -270,6 +309,7 @@ class LiveTracker:
             "newest": self._newest,
             "lateness": self.lateness.state(),
             "clocks": self._clocks.state(),
+            "clock_steps": self._clock_steps.state(),
             "waiting": None if self._room is None else self._room.state(),
             "more": more or {},
         }
@@ -297,6 +337,7 @@ class LiveTracker:
             live._rewinding.set_state(state["rewinding"])
             live._base.set_state(state["base"])
             live._clocks.set_state(state["clocks"])
+            live._clock_steps.set_state(state["clock_steps"])
             newest = live.tracker.time
             if state["waiting"] is not None:
                 live._room = WaitingRoom.of_state(state["waiting"])
@@ -318,6 +359,10 @@ class LiveTracker:
         Scans that wait are taken, those ahead of time too: nothing comes any more that could prove them
         wrong.
         """
+        doubted = self._clock_steps.clear()
+        if doubted:
+            self._take_all(doubted)
+            self._hand_over()
         if self._room is not None:
             self._take_all(self._room.clear())
             self._hand_over()

@@ -82,7 +82,7 @@ class WaitingRoom:
         until_s = max(min(self._slow.values()), self._newest_s - self._most_s)
         ready = [scan for scan in self._scans if scan.t <= until_s]
         self._scans = [scan for scan in self._scans if scan.t > until_s]
-        return Released([*_by_time(ready), *([far] if far else [])], missed)
+        return Released([*by_time(ready), *([far] if far else [])], missed)
 
     def jumped(self, t: float) -> None:
         """Note that time goes on elsewhere (s)."""
@@ -113,6 +113,7 @@ class WaitingRoom:
         return room
 
 
-def _by_time(scans: Sequence[Scan]) -> list[list[Scan]]:
+def by_time(scans: Sequence[Scan]) -> list[list[Scan]]:
+    """Return scans in order of time, those of one time together."""
     ordered = sorted(scans, key=lambda scan: scan.t)
     return [list(some) for _, some in groupby(ordered, key=lambda scan: scan.t)]

@@ -56,7 +56,12 @@ class ClockComparison(NamedTuple):
 
 
 def compare_in_steps(
-    first: Detections, second: Detections, pair: tuple[str, str], latest_s: float | None = None
+    first: Detections,
+    second: Detections,
+    pair: tuple[str, str],
+    latest_s: float | None = None,
+    *,
+    exactly: bool = False,
 ) -> Generator[None, None, ClockComparison]:
     """Compare the clocks of two sensors, a little each step.
 
@@ -66,14 +71,20 @@ def compare_in_steps(
         pair: names of both.
         latest_s: only the latest so much is tracked for the exact offset (s), and steps are kept short; by
             default the first `LOOKED_AT_S` is.
+        exactly: whether boxes that agree as the times are may show a small difference all the same: where the
+            clocks were right before, and one may have drifted.
     """
     pairs = None if latest_s is None else _PAIRS_A_STEP
     agreed = yield from agreement_in_steps(first, second, pairs)
     if agreed is None:
         return ClockComparison(False, None, "")
     if _differ(agreed):
-        found = yield from _exactly(first, second, agreed, latest_s)
+        found = yield from _exactly(first, second, agreed.offset_s, latest_s)
         return ClockComparison(False, found, "")
+    if exactly and _agree(agreed):
+        found = yield from _exactly(first, second, 0.0, latest_s)
+        if found.sure:
+            return ClockComparison(False, found, "")
     contradiction = yield from _contradiction(first, second, agreed, pair, latest_s)
     return ClockComparison(_agree(agreed), None, contradiction)
 
@@ -93,10 +104,9 @@ def _agree(agreed: Agreement) -> bool:
 
 
 def _exactly(
-    first: Detections, second: Detections, agreed: Agreement, latest_s: float | None
+    first: Detections, second: Detections, offset_s: float, latest_s: float | None
 ) -> Generator[None, None, FoundClock]:
-    """Find the offset to the millisecond by the motion of vehicles that both saw."""
-    offset_s = agreed.offset_s
+    """Find the offset, known roughly, to the millisecond by the motion of vehicles that both saw."""
     # Both are tracked for as long as both look, but no longer than is needed.
     begin = max(first.scan_t[0], second.scan_t[0] - offset_s)
     end = min(first.scan_t[-1], second.scan_t[-1] - offset_s)

@@ -47,6 +47,7 @@ class LiveStatus:
 
     Attributes:
         name: address of the camera, as it may be shown.
+        sensor: name of its sensor, where it has one: two channels of a recorder may be shown as one address.
         connected: whether it is connected now.
         ever: whether it has been.
         taken: items that have come.
@@ -57,6 +58,7 @@ class LiveStatus:
     """
 
     name: str
+    sensor: str = ""
     connected: bool = False
     ever: bool = False
     taken: int = 0
@@ -64,6 +66,11 @@ class LiveStatus:
     reconnects: int = 0
     last: float = 0.0
     trouble: str = ""
+
+    @property
+    def shown(self) -> str:
+        """Its sensor, if it has a name, and its address."""
+        return f"{self.sensor} ({self.name})" if self.sensor else self.name
 
 
 class LiveReader(Generic[Item]):
@@ -165,9 +172,9 @@ class LiveReader(Generic[Item]):
         if status.ever:
             status.reconnects += 1
             gone_s = time.monotonic() - status.last
-            self._tell(f"{status.name}: connected again, after {gone_s:.1f} s")
+            self._tell(f"{status.shown}: connected again, after {gone_s:.1f} s")
         else:
-            self._tell(f"{status.name}: connected")
+            self._tell(f"{status.shown}: connected")
         status.connected, status.ever, status.trouble = True, True, ""
         back_off.succeeded()
 
@@ -185,7 +192,7 @@ class LiveReader(Generic[Item]):
         status = self.status
         status.connected, status.trouble = False, str(error)
         pause_s = back_off.failed()
-        self._tell(f"warning: {status.name}: {error}; trying again in {pause_s:g} s")
+        self._tell(f"warning: {status.shown}: {error}; trying again in {pause_s:g} s")
         end = time.monotonic() + pause_s
         while time.monotonic() < end and not self._closed.wait(_SLICE_S):
             pass

@@ -16,7 +16,7 @@ from jeat_graph.detection.named import AUTO, MOTION
 from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import load_settings
 from jeat_graph.io.capture.wall_clock import WallClock
-from jeat_graph.live.service.config import ServiceConfig, SourceConfig, full_url
+from jeat_graph.live.service.config import ServiceConfig, SourceConfig, full_url, sensor_of
 from jeat_graph.live.service.log import Log
 from jeat_graph.live.service.status import Status
 
@@ -43,10 +43,12 @@ class Cameras:
             if source.url is not None:
                 continue
             try:
-                request = _request(source)
+                request = detect_request(source)
             except ConfigError as error:
                 raise ConfigError(f"sources[{k}]: {error}") from None
             camera = stack.enter_context(LiveDetecting(request, log.say, clock))
+            for one in camera.statuses:
+                one.sensor = sensor_of(source) or ""
             status.cameras += camera.statuses
             self._opened.append((camera, source.sensor))
         self._next = 0
@@ -111,7 +113,12 @@ class Cameras:
 _PAUSE_S = 0.005
 
 
-def _request(source: SourceConfig) -> DetectRequest:
+def detect_request(source: SourceConfig) -> DetectRequest:
+    """Return what to look for in a camera.
+
+    Raises:
+        ConfigError: a mask, a setting or an address that is not valid.
+    """
     settings = load_settings(None, list(source.set))
     frames = source.frames is not None
     if source.classes:

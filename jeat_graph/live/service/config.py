@@ -212,7 +212,7 @@ def _check(config: ServiceConfig) -> None:
     for k, source in enumerate(config.sources):
         where = f"sources[{k}]"
         _check_source(source, where)
-        name = _sensor(source)
+        name = sensor_of(source)
         if name is not None and name in sensors:
             raise ConfigError(f"{where}.sensor: {name!r} is another camera's, too; give each its own")
         sensors |= {name} if name is not None else set()
@@ -222,7 +222,8 @@ def _check(config: ServiceConfig) -> None:
             _check_broker(f"sources[{j}].url", source, sink)
 
 
-def _sensor(source: SourceConfig) -> str | None:
+def sensor_of(source: SourceConfig) -> str | None:
+    """Return the name of a camera's sensor; None for a broker, whose messages name theirs."""
     if source.url is not None:
         return None
     return source.sensor or ("rgb" if source.frames is not None else "evt")

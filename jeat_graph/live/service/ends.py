@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TypeVar
 
@@ -77,17 +77,20 @@ class Sinks:
 
     def _send(self, line: str, message: ScanMessage | None) -> None:
         for sink, encoding, status in self._opened:
-            sink.send(encode_tracks(line, self.seq, message, encoding))
+            with self._status.blocked():
+                sink.send(encode_tracks(line, self.seq, message, encoding))
             status.messages += 1
         if self._stdout is not None:
             text = encode_tracks(line, self.seq, message, "json").decode()
-            self._stdout.write(text.rstrip("\n") + "\n")
+            with self._status.blocked():
+                self._stdout.write(text.rstrip("\n") + "\n")
         self.seq += 1
 
     def flush(self) -> None:
         """Wait until all have arrived."""
-        for sink, _, _ in self._opened:
-            sink.flush()
+        with self._status.blocked():
+            for sink, _, _ in self._opened:
+                sink.flush()
 
     def too_large(self) -> int:
         """How many answers were not sent because of their size."""
@@ -123,7 +126,7 @@ def open_sinks(
             sinks.add_stdout(overdue)
             continue
         url = full_url(one.url, one.password_file, one.tls)
-        end = EndStatus(str(sink_address(url)), Notices(log.say))
+        end = EndStatus(_unique(str(sink_address(url)), status.sinks), Notices(log.say))
         status.sinks.append(end)
         open_it = partial(open_sink, url, overdue, notices=end.notices)
         opened = _until_opened(open_it, end, log, stop, status)
@@ -141,13 +144,19 @@ def open_sources(
         if one.url is None:
             continue
         url = full_url(one.url, one.password_file, one.tls)
-        end = EndStatus(str(source_address(url)), Notices(log.say))
+        end = EndStatus(_unique(str(source_address(url)), status.sources), Notices(log.say))
         status.sources.append(end)
         open_it = partial(open_source, url, overdue, notices=end.notices)
         opened = _until_opened(open_it, end, log, stop, status)
         if opened is not None:
             found.append(OpenedSource(opened, end))
     return found
+
+
+def _unique(name: str, ends: Sequence[EndStatus]) -> str:
+    """Return a name that none of the other ends has: two may differ by options alone, which are not shown."""
+    count = sum(one.name.partition(" #")[0] == name for one in ends)
+    return f"{name} #{count + 1}" if count else name
 
 
 def _until_opened(

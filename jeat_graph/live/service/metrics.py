@@ -80,13 +80,15 @@ class Metrics:
         yield family(gauge, "sensor_last_scan_seconds", "time of the newest scan", rows, "sensor")
         rows = [([sensor], one["age_s"]) for sensor, one in sensors]
         yield family(gauge, "sensor_age_seconds", "since the newest scan came", rows, "sensor")
+        rows = [([sensor], one["behind_s"]) for sensor, one in sensors]
+        yield family(gauge, "sensor_behind_seconds", "from the newest scan's time to now", rows, "sensor")
         rows = [([sensor], one["clock"]["lag_s"]) for sensor, one in sensors if one["clock"] is not None]
         yield family(gauge, "sensor_clock_lag_seconds", "found, and taken off its times", rows, "sensor")
         ends = [("source", one) for one in (*health["sources"], *health["cameras"])]
         ends += [("sink", one) for one in health["sinks"]]
         for kind, name, key in ((gauge, "connected", "connected"), (counter, "reconnects", "reconnects")):
-            rows = [([role, one["name"]], float(one[key])) for role, one in ends]
-            yield family(kind, name, f"{name} of sources and sinks", rows, "role", "name")
+            rows = [([role, one["name"], one.get("sensor", "")], float(one[key])) for role, one in ends]
+            yield family(kind, name, f"{name} of sources and sinks", rows, "role", "name", "sensor")
         for name in ("pictures", "dropped"):
-            rows = [([one["name"]], one[name]) for one in health["cameras"]]
-            yield family(counter, f"camera_{name}", f"{name} of a camera", rows, "name")
+            rows = [([one["name"], one["sensor"]], one[name]) for one in health["cameras"]]
+            yield family(counter, f"camera_{name}", f"{name} of a camera", rows, "name", "sensor")

@@ -5,11 +5,10 @@ from __future__ import annotations
 import contextlib
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError
 from jeat_graph.data.trajectories import Trajectories
@@ -18,11 +17,12 @@ from jeat_graph.io.files.setting_aside import set_aside
 from jeat_graph.io.streams.scan_batch import ScanBatch
 from jeat_graph.io.streams.stream_reading import StreamReading
 from jeat_graph.live.interrupts import Interrupts
-from jeat_graph.live.late import LiveTracker, check_saved
+from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import ScanMessage, decode_scans
 from jeat_graph.live.service.cameras import Cameras
+from jeat_graph.live.service.checking import check_start, tracker_config
 from jeat_graph.live.service.config import ServiceConfig
-from jeat_graph.live.service.ends import OpenedSource, Sinks, check_packages, open_sinks, open_sources
+from jeat_graph.live.service.ends import OpenedSource, Sinks, open_sinks, open_sources
 from jeat_graph.live.service.log import ERROR, INFO, WARNING, Log
 from jeat_graph.live.service.status import RUNNING, STOPPING, Status
 from jeat_graph.live.service.systemd import Watchdog, notify
@@ -85,11 +85,7 @@ class Service:
             for path in (config.state.checkpoint, config.state.smoothed):
                 if path is not None:
                     stack.enter_context(hold_file(path))
-            check_packages(config)  # what is wrong of these is known before anything is opened
-            tracker = config.tracker
-            settings = load_config(tracker.config, list(tracker.set), tracker.rig)
-            if config.state.checkpoint is not None:
-                check_saved(Tracker(settings), "state.checkpoint")
+            check_start(config, detectors=False)  # what is wrong is known before anything is opened
             self._saved_tracker(None)
             if config.web.port:
                 web = stack.enter_context(Web(config.web.host, config.web.port, status, log.say))
@@ -176,14 +172,8 @@ class Service:
     def _tracker_config(self, cameras: Cameras) -> Config:
         tracker = self._config.tracker
         image = tracker.image or (cameras.size_px if tracker.rig is None else None)
-        sides = [] if image is None else [f"image.width={image[0]}", f"image.height={image[1]}"]
-        declared = cameras.settings(self._log) if tracker.config == "default" else []
-        made = load_config(tracker.config, [*declared, *tracker.set, *sides], tracker.rig)
-        if self._config.state.smoothed is None:
-            return replace(made, smoother=replace(made.smoother, engine="none"))
-        if made.smoother.engine == "none":
-            raise ConfigError("state.smoothed needs a smoother, but smoother.engine is none")
-        return made
+        declared = cameras.settings(self._log)
+        return tracker_config(tracker, declared, image, self._config.state.smoothed is not None)
 
     def _saved_tracker(self, settings: Config | None) -> tuple[LiveTracker, dict[str, Any]] | None:
         """The tracker from the checkpoint, and what was kept with it; None if there is none to go on from.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -58,8 +59,9 @@ class SensorStatus:
 
     Attributes:
         t: time of its newest scan (s).
-        seen: when that came (s, of `time.monotonic`).
-        taken: when the newest one that the tracker took came, or the first of all (s, of `time.monotonic`).
+        seen: when that came (s, of `Status.listened_s`).
+        taken: when the newest one that the tracker took came, or the first of all (s, of the same).
+        ahead: the most by which a scan's time was ahead of the steady clock when it came (s).
         scans: how many came.
         boxes: in them.
     """
@@ -67,8 +69,17 @@ class SensorStatus:
     t: float
     seen: float
     taken: float
+    ahead: float
     scans: int = 0
     boxes: int = 0
+
+    def behind_s(self) -> float:
+        """How far its newest scan lies behind now (s): by its time where that is the time of day.
+
+        By another clock, how far it is behind where the sensor would be had it gone on as at its best.
+        """
+        behind_s = time.time() - self.t
+        return behind_s if abs(behind_s) < _OTHER_CLOCK_S else self.ahead + time.monotonic() - self.t
 
 
 @dataclass
@@ -122,6 +133,8 @@ class Status:
     saved: float | None = None
     beat: float = field(default_factory=time.monotonic)
     detectors_beat: Callable[[], float] = time.monotonic
+    _blocked_s: float = 0.0
+    _blocked_since: float | None = None
     _since: float = field(default_factory=time.monotonic)
     _silent: set[str] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -130,17 +143,35 @@ class Status:
         """Note that the main thread does something."""
         self.beat = time.monotonic()
 
+    @contextmanager
+    def blocked(self) -> Iterator[None]:
+        """While a broker that takes nothing is waited for: no sensor is listened to, and none is silent."""
+        self._blocked_since = time.monotonic()
+        try:
+            yield
+        finally:
+            self._blocked_s += time.monotonic() - self._blocked_since
+            self._blocked_since = None
+
+    def listened_s(self) -> float:
+        """A steady clock that stands still while no sensor is listened to (s)."""
+        since = self._blocked_since
+        return (time.monotonic() if since is None else since) - self._blocked_s
+
     def quiet_s(self) -> float:
         """For how long (s) the part that was quiet for longest has done nothing."""
         return time.monotonic() - min(self.beat, self.detectors_beat())
 
     def came(self, scans: Iterable[Scan], taken: Collection[str]) -> None:
         """Note scans that have come, and of which sensors the tracker took some or keeps some for later."""
-        now = time.monotonic()
+        now, steady = self.listened_s(), time.monotonic()
         with self._lock:
             for scan in scans:
-                one = self.sensors.setdefault(scan.sensor, SensorStatus(scan.t, now, now))
-                one.t, one.seen = max(one.t, scan.t), now
+                one = self.sensors.setdefault(scan.sensor, SensorStatus(scan.t, now, now, scan.t - steady))
+                if one.t - scan.t > self.silent_s:  # its clock was set back
+                    one.t, one.ahead = scan.t, scan.t - steady
+                one.t, one.ahead = max(one.t, scan.t), max(one.ahead, scan.t - steady)
+                one.seen = now
                 one.scans += 1
                 one.boxes += len(scan)
             for name in taken:
@@ -167,11 +198,11 @@ class Status:
 
     def problems(self) -> list[str]:
         """Return why the service is not ready: a line for each reason."""
-        now = time.monotonic()
+        now = self.listened_s()
         found = [] if self.phase == RUNNING else [f"is {self.phase}"]
         found += [end.problem for end in (*self.sources, *self.sinks) if end.problem]
         found += [
-            f"{camera.name}: not connected{f' ({camera.trouble})' if camera.trouble else ''}"
+            f"{camera.shown}: not connected{f' ({camera.trouble})' if camera.trouble else ''}"
             for camera in self.cameras
             if not camera.connected
         ]
@@ -190,7 +221,7 @@ class Status:
 
         Those that give scans again have None.
         """
-        silent = dict(self._silent_for(time.monotonic()))
+        silent = dict(self._silent_for(self.listened_s()))
         fallen = [(name, silent_s) for name, silent_s in silent.items() if name not in self._silent]
         again = [(name, None) for name in sorted(self._silent - set(silent))]
         self._silent = set(silent)
@@ -202,7 +233,7 @@ class Status:
 
     def health(self) -> dict[str, Any]:
         """Return what `/health` says, as plain data."""
-        now, problems = time.monotonic(), self.problems()
+        now, problems, listened = time.monotonic(), self.problems(), self.listened_s()
         return {
             "ready": not problems,
             "problems": problems,
@@ -213,8 +244,9 @@ class Status:
             "sensors": {
                 name: {
                     "last_scan": one.t,
-                    "age_s": round(now - one.seen, 3),
-                    "taken_age_s": round(now - one.taken, 3),
+                    "age_s": round(listened - one.seen, 3),
+                    "taken_age_s": round(listened - one.taken, 3),
+                    "behind_s": round(one.behind_s(), 3),
                     "passed_over": self.passed_over.get(name, 0),
                     "scans": one.scans,
                     "boxes": one.boxes,
@@ -233,6 +265,7 @@ class Status:
             "cameras": [
                 {
                     "name": camera.name,
+                    "sensor": camera.sensor,
                     "connected": camera.connected,
                     "pictures": camera.taken,
                     "dropped": camera.dropped,
