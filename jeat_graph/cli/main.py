@@ -15,7 +15,7 @@ from jeat_graph.api.beside import COMMAND_GROUP, HOW_TO_GET, find
 from jeat_graph.cli import leave_current_folder
 from jeat_graph.cli.ending import end_with
 from jeat_graph.cli.held_outputs import holding
-from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, write_anything
+from jeat_graph.cli.terminal import Terminated, describe, in_good_order, say, stand_for_closed, write_anything
 from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.data.notes import listening
 from jeat_graph.io.files.outputs import check_named
@@ -128,6 +128,7 @@ def carry_out(command: str | None, parse: Callable[[], argparse.Namespace]) -> i
     Returns:
         An exit code, as `main` does.
     """
+    stand_for_closed()
     write_anything()
     try:
         with in_good_order(command):

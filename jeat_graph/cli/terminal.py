@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.machinery import ExtensionFileLoader
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 from jeat_graph.data.progress import write_line
 from jeat_graph.data.secrets import without_logins
@@ -56,9 +56,14 @@ def describe(error: BaseException) -> str:
     """Say in one line what went wrong, for errors that are the input's or the machine's."""
     if isinstance(error, MemoryError):
         return one_line(f"not enough memory: {error}" if str(error) else "not enough memory")
+    if isinstance(error, OSError) and error.errno == errno.EBADF and not error.filename:
+        return one_line(error.strerror)
     if isinstance(error, OSError) and error.errno in _FULL:
         place = f", writing {error.filename}" if error.filename else ""
-        return one_line(f"the disk is full{place}; nothing unfinished was left under its final name")
+        return one_line(
+            f"the disk is full{place}; files that are written whole are as they were, those that grow end "
+            "with a whole line"
+        )
     return one_line(error)
 
 
@@ -70,6 +75,51 @@ def say(command: str | None, text: object) -> None:
 def warn(command: str | None, text: object) -> None:
     """Tell as `say` does of what may not be as it was meant."""
     say(command, f"warning: {text}")
+
+
+class _Closed:
+    """What stands for a standard stream that was closed before the program began."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    @property
+    def buffer(self) -> NoReturn:
+        """Its bytes; there are none."""
+        raise OSError(errno.EBADF, f"standard {self._name} is closed")
+
+    def write(self, _: str) -> NoReturn:
+        """Write nothing, and do not say that all was well."""
+        raise OSError(errno.EBADF, f"standard {self._name} is closed")
+
+    def read(self, *_: int) -> NoReturn:
+        """Read nothing."""
+        raise OSError(errno.EBADF, f"standard {self._name} is closed")
+
+    def flush(self) -> None:
+        """Nothing waits."""
+
+    def isatty(self) -> bool:
+        """It is no terminal."""
+        return False
+
+    def fileno(self) -> NoReturn:
+        """It has no number."""
+        raise OSError(errno.EBADF, f"standard {self._name} is closed")
+
+
+def stand_for_closed() -> None:
+    """See that standard streams are there: a closed one fails when it is used, in one line.
+
+    Its number is taken by the null device, so that no file that is opened later is written to in its place.
+    """
+    for name in ("input", "output"):
+        attribute = f"std{name[:-3]}"
+        if getattr(sys, attribute) is None:
+            os.open(os.devnull, os.O_RDWR)
+            setattr(sys, attribute, _Closed(name))
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115, for as long as the process lives
 
 
 def write_anything() -> None:

@@ -53,7 +53,7 @@ def test_one_scan_from_the_future_changes_nothing(policy, jump_s, sensor):
     plain, usual, smoothed, _ = run(scans, policy)
     said, tables, rows, live = run([*scans[:80], scan(1.2 + jump_s, sensor, jump_s), *scans[80:]], policy)
     assert [len(one.held) for one in said] == [0] * 80 + [1] + [0] * (len(scans) - 80)
-    assert [one.t for one in said[81].refuted] == [1.2 + jump_s]
+    assert [one.t for arrival in said for one in arrival.refuted] == [1.2 + jump_s]
     assert live.lateness.summary()[sensor].dropped == 1
     assert_equal(
         Trajectories.concatenate([tables]),
@@ -65,13 +65,12 @@ def test_one_scan_from_the_future_changes_nothing(policy, jump_s, sensor):
     assert len(usual)
 
 
-def test_one_of_two_clocks_that_is_wrong_for_good_ends_nothing():
+def test_one_of_two_clocks_that_leaps_is_corrected_and_ends_nothing():
     scans = both(0.0, 4.0)
     wrong = [scan(one.t + 60.0, "evt") if one.sensor == "evt" and one.t > 1.0 else one for one in scans]
     said, _, _, live = run(wrong)
-    assert said[-1].t == max(one.t for one in scans if one.sensor == "rgb")
-    assert live.lateness.summary()["rgb"].dropped == 0
-    assert live.lateness.summary()["evt"].dropped > 100
+    assert said[-1].t == pytest.approx(max(one.t for one in scans), abs=1e-3)
+    assert live.lateness.dropped == 0
 
 
 @pytest.mark.parametrize("alone", [False, True])
@@ -128,4 +127,4 @@ def test_late_scans_of_one_sensor_do_not_turn_time_back_while_another_goes_on():
     wrong = [scan(one.t - 60.0, "evt") if one.sensor == "evt" and one.t > 101.0 else one for one in scans]
     said, _, _, _ = run(wrong)
     assert not any(one.anew for one in said)
-    assert said[-1].t == max(one.t for one in scans if one.sensor == "rgb")
+    assert said[-1].t == pytest.approx(max(one.t for one in scans), abs=1e-3)

@@ -6,11 +6,12 @@ emptied in its place (`copytruncate`) begins anew, too. Both begin with the same
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 from collections.abc import Callable
+from io import FileIO
 from pathlib import Path
-from typing import BinaryIO
 
 from jeat_graph.io.files.pipe_writer import PipeWriter, is_pipe, never
 
@@ -72,14 +73,26 @@ class GrowingFile:
         except FileNotFoundError:
             return True
 
-    def _opened(self) -> BinaryIO:
+    def _opened(self) -> FileIO:
         # To the end, wherever that is by now: into a file that was emptied no hole is written.
-        return self._path.open("ab")
+        return self._path.open("ab", buffering=0)
 
     def _write(self, data: bytes) -> None:
         if self._pipe is not None:
             self._pipe.write(data)
         else:
-            self._file.write(data)
-            self._file.flush()
+            self._write_whole(data)
         self._size += len(data)
+
+    def _write_whole(self, data: bytes) -> None:
+        """Write all or nothing: of lines that the disk has no room for, none is left half written."""
+        done = 0
+        try:
+            while done < len(data):
+                done += self._file.write(data[done:])
+        except OSError as error:
+            if self._is_file:
+                with contextlib.suppress(OSError):
+                    self._file.truncate(os.fstat(self._file.fileno()).st_size - done)
+            error.filename = str(self._path)
+            raise

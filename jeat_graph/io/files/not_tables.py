@@ -50,12 +50,12 @@ def what_it_is(data: bytes) -> str | None:
             return text
     if data[4:8] == b"ftyp":
         return _VIDEO
-    if data.startswith(_PROPHESEE) and not _is_text(data[:HEAD_BYTES]):
+    if data.startswith(_PROPHESEE) and not is_text(data[:HEAD_BYTES]):
         return _EVENTS
     return None
 
 
-def _is_text(head: bytes) -> bool:
+def is_text(head: bytes) -> bool:
     """Whether bytes can be text, but for a character that is cut off at their end."""
     if b"\0" in head:
         return False

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.files.limits import check_file
-from jeat_graph.io.files.not_tables import HEAD_BYTES, what_it_is
+from jeat_graph.io.files.not_tables import HEAD_BYTES, is_text, what_it_is
 from jeat_graph.io.media.picture_file import read_picture
 
 RgbImage = npt.NDArray[np.uint8]
@@ -114,12 +114,30 @@ def _hint(path: Path) -> str:
     return "; events go to --events" if other is not None and "--events" in other else ""
 
 
+def _refuse_lists(path: Path) -> None:
+    """Refuse text: FFmpeg would follow a list (HLS, DASH, SDP, `ffconcat`) to any other file or address.
+
+    Raises:
+        DataError: the file is text; no format of video is, but for the head of Y4M.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+    except OSError:
+        return  # FFmpeg says what is wrong
+    if head and is_text(head) and not head.startswith(b"YUV4MPEG2"):
+        raise DataError(
+            "is text, no video; a list of videos is not followed: give the videos themselves", path
+        )
+
+
 class VideoDecoder(Decoder):
     """Frames of a video file."""
 
     def __init__(self, path: Path) -> None:
         import cv2
 
+        _refuse_lists(path)
         self._path = path
         self._capture = quietly(lambda: cv2.VideoCapture(str(path), cv2.CAP_FFMPEG))
         if not self._capture.isOpened():
