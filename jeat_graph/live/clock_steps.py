@@ -77,9 +77,10 @@ class Judged(NamedTuple):
 
 @dataclass
 class _Rhythm:
-    """How a sensor's own times go on: its newest (s), and its last intervals (s)."""
+    """How a sensor's own times go on: its newest and its first (s), and its last intervals (s)."""
 
     newest: float
+    begun: float
     intervals: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT))
 
     @property
@@ -197,7 +198,7 @@ class ClockSteps:
         rhythm = self._rhythms.get(sensor)
         if rhythm is None:
             return
-        rhythm.newest -= lag_s
+        rhythm.newest, rhythm.begun = rhythm.newest - lag_s, rhythm.begun - lag_s
         for marks in (*self._marks.values(), *(doubt.marks for doubt in self._doubts.values())):
             if sensor in marks:
                 marks[sensor] -= lag_s
@@ -223,7 +224,7 @@ class ClockSteps:
         """Take note of a scan that follows, or comes a little late."""
         rhythm = self._rhythms.get(scan.sensor)
         if rhythm is None:
-            rhythm = self._rhythms[scan.sensor] = _Rhythm(scan.t)
+            rhythm = self._rhythms[scan.sensor] = _Rhythm(scan.t, scan.t)
         elif scan.t > rhythm.newest:
             rhythm.intervals.append(scan.t - rhythm.newest)
             rhythm.newest = scan.t
@@ -250,8 +251,9 @@ class ClockSteps:
         return doubt
 
     def _went_on(self, marks: Mapping[str, float], names: Sequence[str]) -> float:
-        """By how much (s) the others went on since they had these times, that which did so most."""
-        return max((self._rhythms[name].newest - marks[name] for name in names if name in marks), default=0.0)
+        """By how much (s) the others went on since they had these times, or since they began: the most."""
+        ones = {name: self._rhythms[name] for name in names}
+        return max((one.newest - marks.get(name, one.begun) for name, one in ones.items()), default=0.0)
 
     def _accept(self, scan: Scan) -> None:
         """Let a sensor go on from another time."""
@@ -328,7 +330,9 @@ class ClockSteps:
     def state(self) -> dict[str, Any]:
         """Return plain data, for `set_state`."""
         return {
-            "rhythms": {name: [one.newest, list(one.intervals)] for name, one in self._rhythms.items()},
+            "rhythms": {
+                name: [one.newest, one.begun, list(one.intervals)] for name, one in self._rhythms.items()
+            },
             "marks": self._marks,
             "doubts": {name: dict(vars(one)) for name, one in self._doubts.items()},
         }
@@ -336,8 +340,8 @@ class ClockSteps:
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go on from what `state` returned."""
         self._rhythms = {
-            name: _Rhythm(newest, deque(intervals, maxlen=_KEPT))
-            for name, (newest, intervals) in state["rhythms"].items()
+            name: _Rhythm(newest, begun, deque(intervals, maxlen=_KEPT))
+            for name, (newest, begun, intervals) in state["rhythms"].items()
         }
         self._marks = {name: dict(marks) for name, marks in state["marks"].items()}
         self._doubts = {name: _Doubt(**one) for name, one in state["doubts"].items()}

@@ -73,6 +73,15 @@ def test_a_pause_of_one_sensor_or_of_all_is_no_step(who, gap_s):
     assert all(one.t == true for true, one in taken)
 
 
+def test_a_sensor_that_was_silent_before_the_other_began_comes_back_without_a_step():
+    times = [
+        (t, s, t) for t, s in arrivals(5.0) if (s == "evt") == (1.0 < t < 4.0) or (s == "rgb" and t > 4.0)
+    ]
+    taken, found, refuted, together = judge(ClockSteps(LATE_S), times)
+    assert (found, refuted, together) == ([], [], [])
+    assert all(one.t == true for true, one in taken)
+
+
 def test_one_wrong_time_ahead_is_passed_over():
     times = [(t, s, t + 1.0 * (s == "evt" and 3.0 <= t < 3.012)) for t, s in arrivals(4.0, 0.0)]
     assert sum(t != true for true, _, t in times) in (1, 2)
