@@ -80,7 +80,7 @@ def run(args: argparse.Namespace) -> int:
     camera = None if args.camera is None else read_camera(args.camera)
     vehicles, unknown = read_poses(args.source)
     if unknown:
-        say("conflicts", f"{unknown} tracks have no size or speed and are left out")
+        say("conflicts", f"{unknown} tracks stand all the time, or have no size or speed, and are left out")
     found = encounters(vehicles, config)
     surely = [one for one in found if sure(one, config)]
     doubtful = [one for one in found if not sure(one, config)]

@@ -171,6 +171,22 @@ def test_the_command_lists_conflicts_and_what_is_in_doubt_apart(
     assert "--picture says nothing without --camera" in capsys.readouterr().err
 
 
+def test_what_lies_in_one_another_and_what_only_stands_is_no_near_miss(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One vehicle seen twice; and one that stands beside the lane, whose heading is noise."""
+    one = vehicle(1, 0.0, 10.0 * T, 10.0, 0.0)
+    twice = vehicle(2, 0.4, 10.0 * T + 1.0, 10.0, 0.0)
+    heading = np.random.default_rng(0).uniform(-3.0, 3.0, len(T))
+    stands = vehicle(3, 2.5, 30.0, 0.05, heading)
+    write_road(tmp_path / "road", [one, twice, stands])
+    assert main(["conflicts", str(tmp_path / "road"), "--out", str(tmp_path / "out")]) == 0
+    told = capsys.readouterr()
+    assert "0 conflicts among 2 vehicles" in told.out
+    assert "1 tracks stand all the time" in told.err
+    assert len(pd.read_csv(tmp_path / "out" / "doubtful.csv")) == 0
+
+
 def test_a_road_of_points_has_no_sizes_and_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

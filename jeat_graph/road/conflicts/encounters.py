@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.config.fields import check, number
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.road.conflicts.measures import Collision, arrivals, collision, encroachment, separation
-from jeat_graph.road.conflicts.poses import HEADING, LENGTH, SPEED, Poses
+from jeat_graph.road.conflicts.poses import HEADING, LENGTH, SPEED, WIDTH, Poses
 from jeat_graph.road.speeds import Z95
 
 REAR_END, CROSSING, HEAD_ON = "rear-end", "crossing", "head-on"
@@ -29,7 +29,8 @@ _AROUND_S = 1.0
 #: The fine grid of post-encroachment times: this wide to either side (s), and this many steps.
 _FINE_S, _FINE = 0.4, 14
 _PERCENT = (2.5, 97.5)
-_LARGEST_SIDE_M = 12.0
+#: How far beyond its estimate a vehicle may be (standard deviations), to be looked at.
+_BEYOND = 3.0
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ def encounters(
         Those with a probability above 0; `sure` tells which are beyond doubt.
     """
     order = sorted(range(len(vehicles)), key=lambda k: (vehicles[k].t[0], vehicles[k].track_id))
-    boxes = [(v.mean[:, :2].min(axis=0), v.mean[:, :2].max(axis=0)) for v in vehicles]
+    boxes = [_reach(one) for one in vehicles]
     found = []
     for i, k in enumerate(order):
         one = vehicles[k]
@@ -138,7 +139,7 @@ def encounters(
             if other.t[0] > one.t[-1] + config.longest_s:
                 break
             (low, high), (least, most) = boxes[k], boxes[j]
-            if (low > most + _LARGEST_SIDE_M).any() or (least > high + _LARGEST_SIDE_M).any():
+            if (low > most).any() or (least > high).any():
                 continue
             encounter = _encounter(one, other, config)
             if encounter is not None and encounter.probability > 0.0:
@@ -146,6 +147,14 @@ def encounters(
         if progress is not None:
             progress(i + 1, len(order))
     return sorted(found, key=lambda e: (e.t, e.first, e.second))
+
+
+def _reach(vehicle: Poses) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest x, y (m) that a vehicle may cover."""
+    turn = np.abs(np.stack([np.sin(vehicle.mean[:, HEADING]), np.cos(vehicle.mean[:, HEADING])], axis=1))
+    half = (turn * vehicle.mean[:, LENGTH, None] + turn[:, ::-1] * vehicle.mean[:, WIDTH, None]) / 2.0
+    far = half + _BEYOND * vehicle.sigma[:, :2]
+    return (vehicle.mean[:, :2] - far).min(axis=0), (vehicle.mean[:, :2] + far).max(axis=0)
 
 
 def sure(encounter: Encounter, config: ConflictConfig) -> bool:
@@ -166,13 +175,18 @@ def _encounter(one: Poses, other: Poses, config: ConflictConfig) -> Encounter | 
     kind = REAR_END if follow else HEAD_ON if angle > 180.0 - config.following_deg else CROSSING
     draws = len(_errors())
     ttc, drac, times = np.full(draws, np.inf), np.zeros(draws), t_second
+    crash = np.zeros(draws, dtype=np.bool_)
     if together is not None:
-        of_draws, times = together
+        of_draws, crash, times = together
         ttc, drac = of_draws
     pet = _pet(first, second, t_first, t_second)
     hits = (ttc < config.ttc_s) | (drac > config.drac)
     if not follow:
         hits |= pet < config.pet_s
+    # Both drove on, so what lies in one another is no near miss: wrong places, or one vehicle seen twice.
+    hits &= ~crash
+    if crash[0]:
+        return None
     place = second.at(np.array([times])).mean[0]
     headway = NOTHING
     if follow:
@@ -211,8 +225,11 @@ def _first_of(one: Poses, other: Poses, config: ConflictConfig) -> tuple[Poses, 
     return one, other, float(a.t[i[k]]), float(b.t[j[k]])
 
 
-def _least_ttc(first: Poses, second: Poses) -> tuple[Collision, float] | None:
-    """Least TTC and most DRAC of each draw, and when the estimate's is least; None without common times."""
+def _least_ttc(first: Poses, second: Poses) -> tuple[Collision, BoolArray, float] | None:
+    """Least TTC and most DRAC of each draw, whether it is a crash, and when the estimate's TTC is least.
+
+    None where they have no common times.
+    """
     begin, end = max(first.t[0], second.t[0]), min(first.t[-1], second.t[-1])
     if end - begin < _STEP_S:
         return None
@@ -225,8 +242,9 @@ def _least_ttc(first: Poses, second: Poses) -> tuple[Collision, float] | None:
     around = np.abs(t - t[k]) <= _AROUND_S
     a, b = first.at(t[around]), second.at(t[around])
     z = _errors()
-    drawn = collision(a.drawn(z[:, :6]), b.drawn(z[:, 6:]))
-    return Collision(drawn.ttc.min(axis=1), drawn.drac.max(axis=1)), float(t[k])
+    states = a.drawn(z[:, :6]), b.drawn(z[:, 6:])
+    drawn, crash = collision(*states), (separation(*states) <= 0.0).any(axis=1)
+    return Collision(drawn.ttc.min(axis=1), drawn.drac.max(axis=1)), crash, float(t[k])
 
 
 def _pet(first: Poses, second: Poses, t_first: float, t_second: float) -> FloatArray:

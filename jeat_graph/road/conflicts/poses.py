@@ -14,6 +14,8 @@ _KMH = 3.6
 #: Columns that have a variance: x, y (m), speed (km/h), heading (degrees), length, width (m).
 _STATES = ("x", "y", "speed_kmh", "heading_deg", "length", "width")
 _UNITS = np.array([1.0, 1.0, 1.0 / _KMH, np.pi / 180.0, 1.0, 1.0])
+#: A vehicle slower than this (m/s) does not show where it faces.
+_DRIVES = 2.0
 X, Y, SPEED, HEADING, LENGTH, WIDTH = range(6)
 
 
@@ -50,7 +52,7 @@ class Poses(NamedTuple):
 
 
 def read_poses(source: str | Path) -> tuple[list[Poses], int]:
-    """Read what `road` wrote: vehicles with a speed and a size, by identity, and how many have none.
+    """Read what `road` wrote: vehicles that drive and have a size, by identity, and how many do not.
 
     Args:
         source: a folder that `road` wrote, or a table of it.
@@ -83,10 +85,20 @@ def read_poses(source: str | Path) -> tuple[list[Poses], int]:
         if len(own) < 2:
             unknown += 1
             continue
-        states = mean[own]
+        states, spread = mean[own], sigma[own]
+        drives = np.flatnonzero(states[:, SPEED] >= _DRIVES)
+        if not len(drives):
+            unknown += 1
+            continue
+        # While it stands it faces as it did when it drove last, or will drive next.
+        after = np.minimum(np.searchsorted(drives, np.arange(len(own))), len(drives) - 1)
+        before = np.maximum(after - 1, 0)
+        nearer = np.arange(len(own)) - drives[before] < drives[after] - np.arange(len(own))
+        known_at = drives[np.where(nearer, before, after)]
+        states[:, HEADING], spread[:, HEADING] = states[known_at, HEADING], spread[known_at, HEADING]
         states[:, HEADING] = np.unwrap(states[:, HEADING])
         track = int(ids[own[0]])
-        vehicles.append(Poses(track, kinds.get(track, ""), t[own], states, sigma[own]))
+        vehicles.append(Poses(track, kinds.get(track, ""), t[own], states, spread))
     if unknown and not vehicles:
         raise DataError(
             "no vehicle has a length and a width: make it from boxes (road RUN), not from points", path
