@@ -85,9 +85,20 @@ def test_events_given_as_frames_name_the_other_option(tmp_path):
 
 
 def test_a_broken_video_is_not_taken_for_events(tmp_path):
-    (tmp_path / "night.mp4").write_bytes(b"nothing")
+    (tmp_path / "night.mp4").write_bytes(b"\0nothing")
     with pytest.raises(DataError, match=r"is not a video that can be read$"):
         peek(tmp_path / "night.mp4")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["#EXTM3U\n#EXTINF:1,\nother.mp4\n", "ffconcat version 1.0\nfile other.mp4\n", "v=0\no=- 0 0 IN\n"],
+)
+@pytest.mark.parametrize("name", ["list.m3u8", "night.mp4"])
+def test_a_list_of_videos_is_not_followed_to_its_neighbours(text, name, tmp_path):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(DataError, match="a list of videos is not followed"):
+        peek(tmp_path / name)
 
 
 def test_compressed_events_are_to_be_unpacked(tmp_path):

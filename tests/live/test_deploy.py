@@ -23,6 +23,19 @@ def test_systemd_takes_the_unit(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def test_the_unit_is_exposed_little(tmp_path):
+    """What systemd itself makes of it: 0 is shut off, 10 is exposed."""
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("systemd is not installed")
+    unit = tmp_path / "jeat-graph@gantry7.service"
+    unit.write_text(UNIT.read_text())
+    command = ["systemd-analyze", "security", "--offline=yes", "--no-pager", str(unit)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    [level] = re.findall(r"Overall exposure level for \S+: ([0-9.]+)", done.stdout)
+    assert float(level) < 3.0
+    assert "PrivateDevices" not in UNIT.read_text()  # cameras are devices
+
+
 def test_the_unit_says_what_the_command_does():
     unit = UNIT.read_text()
     assert "Type=notify" in unit
