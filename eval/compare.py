@@ -13,6 +13,7 @@ from jeat_graph.eval.consistency import consistency
 from jeat_graph.eval.samples import (
     RECENT_S,
     Samples,
+    WholeTrack,
     by_availability,
     by_distance,
     collect_samples,
@@ -30,6 +31,8 @@ LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)
 _CONSISTENCY = 0.3
 # What tables call the smoother of whole tracks; its key in the values is `full`.
 _WHOLE = "whole track"
+# The same by GTSAM, as `smoother.engine` calls it.
+_GTSAM = "gtsam-full"
 # What can be said of an estimator by true places alone.
 _OF_PLACES = ("estimator", "position", "position/filter", "ANEES position")
 
@@ -61,6 +64,7 @@ def compare(
     lags_s: Sequence[float] = LAGS_S,
     iou: float = 0.5,
     image: tuple[float, float] | None = None,
+    gtsam: bool = False,
 ) -> Comparison:
     """Compare the filter, the smoother at several lags, and the smoother of whole tracks.
 
@@ -76,6 +80,7 @@ def compare(
         lags_s: lags (s); 0 is the filter.
         iou: smallest IoU of a match.
         image: width and height of the picture (px): what its edges cut has no place of its own.
+        gtsam: whether GTSAM smooths whole tracks, too, for a row beside that of our own pass.
     """
     lags = tuple(sorted(set(lags_s)))
     values: dict[str, Any] = {"tracks": len(tracks), "sensors": list(sensors)}
@@ -86,7 +91,8 @@ def compare(
     if truth is not None and causal is not None:
         truth = with_centres(truth, image)
         with progress_span(_CONSISTENCY, 1.0):
-            samples = collect_samples(tracks, truth, causal, lags, instants=instants, iou=iou)
+            others = _by_gtsam() if gtsam else None
+            samples = collect_samples(tracks, truth, causal, lags, instants=instants, iou=iou, others=others)
         if len(samples):
             errors = {name: errors_of(samples, name) for name in samples.states}
             values["errors"] = errors
@@ -106,6 +112,12 @@ def compare(
     return Comparison(values, tables, samples, lags)
 
 
+def _by_gtsam() -> dict[str, WholeTrack]:
+    from jeat_graph.smoothers.gtsam.solvers import solve_whole
+
+    return {_GTSAM: solve_whole}
+
+
 def _by_group(samples: Samples, groups: dict[str, BoolArray]) -> list[dict[str, Any]]:
     """Errors of filter and full smoother in each group that is not empty."""
     return [
@@ -122,7 +134,7 @@ def _error_table(errors: dict[str, dict[str, float]], motion: bool) -> Table:
         if name == lag_name(0.0):
             continue
         record: dict[str, Cell] = {
-            "estimator": _WHOLE if name == "full" else name,
+            "estimator": {"full": _WHOLE, _GTSAM: f"{_WHOLE}, GTSAM"}.get(name, name),
             "position": one["position_rmse"],
             "velocity": one["velocity_rmse"],
             "acceleration": one["acceleration_rmse"],

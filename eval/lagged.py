@@ -55,6 +55,18 @@ def states_at(
     )
 
 
+def states_by(track: FilteredTrack, t: FloatArray, smoothed: tuple[FloatArray, FloatArray]) -> States:
+    """Return a track's states at given times (T,) from smoothed ones at its records.
+
+    Args:
+        track: the filter's records.
+        t: (T,) times (s), not before the track's first.
+        smoothed: means (K, 2, D) and covariances (K, 2, D, D) at the records.
+    """
+    at = last_record(track, t)
+    return _moved(track, (smoothed[0][at], smoothed[1][at]), np.asarray(t) - track.t[at])
+
+
 def last_record(track: FilteredTrack, t: FloatArray) -> IntArray:
     """Return the last record (T,) of a track that is not after each time (s)."""
     return np.asarray(np.searchsorted(track.t, np.asarray(t) + _COINCIDENT_S, side="right") - 1)

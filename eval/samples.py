@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from jeat_graph.eval.breakdown import DISTANCE_BINS_M
 from jeat_graph.eval.consistency import PARTS, chi2_bounds
 from jeat_graph.eval.frames import build_frames
 from jeat_graph.eval.kinematics import matched_errors
-from jeat_graph.eval.lagged import States, last_record, states_at
+from jeat_graph.eval.lagged import States, last_record, states_at, states_by
 from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 #: A sensor counts as available to a track if it gave it a detection within this time before (s).
@@ -24,6 +25,10 @@ RECENT_S = 0.1
 EDGE_PX = 1.0
 # A time of the truth further from the last scan than this is not judged (s).
 _FURTHEST_S = 0.05
+
+
+#: Smooths a whole track: means (K, 2, D) and covariances (K, 2, D, D) at its records.
+WholeTrack: TypeAlias = Callable[[FilteredTrack], tuple[FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +93,7 @@ def collect_samples(
     *,
     instants: FloatArray | None = None,
     iou: float = 0.5,
+    others: Mapping[str, WholeTrack] | None = None,
 ) -> Samples:
     """Estimate each track at those times of the truth at which the causal table matches it to an object.
 
@@ -98,6 +104,7 @@ def collect_samples(
         lags_s: lags (s).
         instants: all times at which the tracker gave output (s), if known.
         iou: smallest IoU of a match.
+        others: more smoothers of whole tracks, by what they are called.
 
     Objects cut off by the picture's edge are left out: a detector sees the centre of what is left of them.
     """
@@ -110,7 +117,8 @@ def collect_samples(
     whole = ~matched.truncated & known
     identity, row = frames.tracks.track_id[entry][whole], row[whole]
     t = truth.t[row]
-    names = ["filter", *(lag_name(lag) for lag in lags_s), "full"]
+    more = {} if others is None else others
+    names = ["filter", *(lag_name(lag) for lag in lags_s), "full", *more]
     parts: list[tuple[IntArray, IntArray, list[States]]] = []
     for track in with_progress(tracks):
         mine = np.flatnonzero(identity == track.track_id)
@@ -118,7 +126,8 @@ def collect_samples(
         mine = mine[t[mine] - track.t[last_record(track, t[mine])] <= _FURTHEST_S]
         if len(mine):
             filtered, lagged, full = states_at(track, t[mine], lags_s)
-            parts.append((mine, _available(track, t[mine]), [filtered, *lagged, full]))
+            beside = [states_by(track, t[mine], smooth(track)) for smooth in more.values()]
+            parts.append((mine, _available(track, t[mine]), [filtered, *lagged, full, *beside]))
     order = np.concatenate([mine for mine, _, _ in parts]) if parts else np.zeros(0, dtype=np.int64)
     states = {
         name: States(

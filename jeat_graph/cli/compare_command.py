@@ -50,6 +50,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="lags of the curve in seconds; 0 is the filter",
     )
+    parser.add_argument(
+        "--gtsam", action="store_true", help="also smooth whole tracks by GTSAM, for a row of its own (slow)"
+    )
     add_tables(parser)
     parser.add_argument("--no-plots", action="store_true", help="write no pictures")
 
@@ -79,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         stage("reading, or tracking again")
         measured = measured_run(folder, args.detections)
         stage("smoothing at all lags")
-        comparison = compare_run(measured, truth, args.lags)
+        comparison = compare_run(measured, truth, args.lags, args.gtsam)
         comparison = with_road(comparison, folder, args.road or road_truth_beside(folder, args.gt))
     print("\n".join(table.render() for table in comparison.tables), end="")
     with open_atomic(out / "compare.json") as file:

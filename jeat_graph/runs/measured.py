@@ -76,7 +76,10 @@ def track_measured(config: Config, detections: Detections, *, progress: bool = F
 
 
 def compare_run(
-    run: MeasuredRun, truth: GroundTruth | None = None, lags_s: Sequence[float] | None = None
+    run: MeasuredRun,
+    truth: GroundTruth | None = None,
+    lags_s: Sequence[float] | None = None,
+    gtsam: bool = False,
 ) -> Comparison:
     """Compare the filter with smoothers on a run.
 
@@ -84,6 +87,7 @@ def compare_run(
         run: with its measurements.
         truth: true boxes, with motion or without; without truth only consistency is judged.
         lags_s: lags (s), 0 is the filter; those of `eval.compare` if not given.
+        gtsam: whether GTSAM smooths whole tracks, too.
     """
     from jeat_graph.eval.compare import LAGS_S, compare
 
@@ -95,6 +99,7 @@ def compare_run(
         instants=run.instants,
         lags_s=lags_s or LAGS_S,
         image=run.image,
+        gtsam=gtsam,
     )
 
 
