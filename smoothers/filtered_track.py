@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.smoothers.state_rts import FilterRecord, rts_step
+from jeat_graph.smoothers.state_rts import FilterRecord, gains, rts_step
 
 #: Of a state per axis the first three are place, velocity and acceleration.
 MOTION = 3
@@ -100,15 +100,16 @@ class FilteredTrack:
         """
         now = np.maximum(until, at)
         mean, covariance = self.mean[now], self.covariance[now]
+        gain = gains(self.covariance[:-1], self.F[1:], self.predicted_covariance[1:])
         for _ in range(int((now - at).max(initial=0))):
             rows = np.flatnonzero(now > at)
             later, before = now[rows], now[rows] - 1
-            mean[rows], covariance[rows] = rts_step(
-                (self.mean[before], self.covariance[before]),
-                self.F[later],
-                (self.predicted_mean[later], self.predicted_covariance[later]),
-                (mean[rows], covariance[rows]),
-            )
+            G = gain[before]
+            correction = (mean[rows] - self.predicted_mean[later])[..., None]
+            mean[rows] = self.mean[before] + (G @ correction)[..., 0]
+            spread = covariance[rows] - self.predicted_covariance[later]
+            spread = self.covariance[before] + G @ spread @ np.swapaxes(G, -1, -2)
+            covariance[rows] = (spread + np.swapaxes(spread, -1, -2)) / 2.0
             now[rows] = before
         return mean, covariance
 

@@ -76,6 +76,19 @@ def rts_step(
     return _first(mean, state[0].shape), _first(out, state[1].shape)
 
 
+def gains(covariance: FloatArray, F: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Return G (N, A, D, D) of the step back to filtered states from the next record.
+
+    Args:
+        covariance: (N, A, D, D).
+        F: (N, 1 or A, D, D).
+        predicted: (N, A, D, D).
+    """
+    shape = covariance.shape
+    Gt = _transposed_gain(_last(covariance), _last(np.broadcast_to(F, shape)), _last(predicted))
+    return np.swapaxes(_first(Gt, shape), -1, -2)
+
+
 def _transposed_gain(P: FloatArray, F: FloatArray, predicted: FloatArray) -> FloatArray:
     """Return Gᵀ = (P⁻)⁻¹ F P (D, D, B) by Cholesky's factor of P⁻ in a scaled state.
 
