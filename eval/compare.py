@@ -62,7 +62,6 @@ def compare(
     causal: Trajectories | None = None,
     instants: FloatArray | None = None,
     lags_s: Sequence[float] = LAGS_S,
-    iou: float = 0.5,
     image: tuple[float, float] | None = None,
     gtsam: bool = False,
 ) -> Comparison:
@@ -78,7 +77,6 @@ def compare(
         causal: the causal table, which decides what track is matched to what object at what time.
         instants: all times at which the tracker gave output (s), if known.
         lags_s: lags (s); 0 is the filter.
-        iou: smallest IoU of a match.
         image: width and height of the picture (px): what its edges cut has no place of its own.
         gtsam: whether GTSAM smooths whole tracks, too, for a row beside that of our own pass.
     """
@@ -92,7 +90,7 @@ def compare(
         truth = with_centres(truth, image)
         with progress_span(_CONSISTENCY, 1.0):
             others = _by_gtsam() if gtsam else None
-            samples = collect_samples(tracks, truth, causal, lags, instants=instants, iou=iou, others=others)
+            samples = collect_samples(tracks, truth, causal, lags, instants=instants, others=others)
         if len(samples):
             errors = {name: errors_of(samples, name) for name in samples.states}
             values["errors"] = errors
