@@ -32,8 +32,9 @@ class ModelConstants:
         fastest_growth: largest growth rate that perspective is computed for (1/s).
         velocity_std, acceleration_std, growth_std: at a birth (sizes/s, sizes/s², 1/s).
         side_std: standard deviation of a measured side (sizes). Prior.
-        side_std_bounds: least and largest learnt value of it. Without a floor parked cars, of which a
-            detector repeats the same box, teach that boxes are exact.
+        side_std_bounds: least and largest learnt value of it (measured): boxes that repeat are not therefore
+            right. Without a floor parked cars, of which a detector repeats the same box, teach that
+            boxes are exact.
         pixel_std: part of it that does not shrink with the object (px): boxes in whole pixels.
         degrees_of_freedom: of Student's t of the sides; heavy tails as measured.
         cut_share: prior probability that one given side is cut by an occluder.
@@ -147,7 +148,7 @@ class ModelConstants:
     growth_std: float = 0.3
 
     side_std: float = 0.09
-    side_std_bounds: tuple[float, float] = (0.02, 0.4)
+    side_std_bounds: tuple[float, float] = (0.06, 0.4)
     pixel_std: float = 0.5
     degrees_of_freedom: float = 6.0
     cut_share: float = 0.02
