@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.io.tables.file_tables import FileTable, read_table
+from jeat_graph.data.tables.file_table import FileTable
+from jeat_graph.io.tables.file_tables import read_table
 
 _CROSSINGS = "crossings.csv"
 
@@ -40,7 +41,7 @@ class OdFlow(NamedTuple):
 
     origin: str
     destination: str
-    count: int
+    number: int
 
 
 @dataclass(frozen=True)

@@ -193,7 +193,7 @@ def _od(flows: Sequence[OdFlow]) -> str:
     """Ways between places: a band from each origin on the left to each destination on the right."""
     if not flows:
         return ""
-    total = sum(one.count for one in flows)
+    total = sum(one.number for one in flows)
     origins = list(dict.fromkeys(one.origin for one in flows))
     destinations = list(dict.fromkeys(sorted(one.destination for one in flows)))
     gap, room = 14, 380
@@ -204,7 +204,7 @@ def _od(flows: Sequence[OdFlow]) -> str:
         at, out = 10.0, {}
         for name in names:
             out[name] = at
-            at += scale * sum(one.count for one in flows if getattr(one, key) == name) + gap
+            at += scale * sum(one.number for one in flows if getattr(one, key) == name) + gap
         return out
 
     left, right = tops(origins, "origin"), tops(destinations, "destination")
@@ -218,18 +218,18 @@ def _od(flows: Sequence[OdFlow]) -> str:
     x1, x2 = 160.0, _WIDTH - 160.0
     middle = (x1 + x2) / 2.0
     for one in flows:
-        tall = scale * one.count
+        tall = scale * one.number
         a, b = left[one.origin], right[one.destination]
         left[one.origin], right[one.destination] = a + tall, b + tall
         shape = (
             f"M{x1} {a:.1f}C{middle} {a:.1f} {middle} {b:.1f} {x2} {b:.1f}V{b + tall:.1f}"
             f"C{middle} {b + tall:.1f} {middle} {a + tall:.1f} {x1} {a + tall:.1f}Z"
         )
-        title = escape(f"{one.origin} to {one.destination or 'not known'}: {one.count}")
+        title = escape(f"{one.origin} to {one.destination or 'not known'}: {one.number}")
         colour = f"var(--s{origins.index(one.origin) % _COLOURS})"
         parts.append(f'<path d="{shape}" fill="{colour}" fill-opacity=".55"><title>{title}</title></path>')
     records: list[dict[str, Cell]] = [
-        {"from": one.origin, "to": one.destination or "not known", "vehicles": one.count} for one in flows
+        {"from": one.origin, "to": one.destination or "not known", "vehicles": one.number} for one in flows
     ]
     table = table_html(Table.from_records(records, title="Vehicles from where to where"))
     return f"<h2>Origin and destination</h2>{_svg(parts, height, 'Ways of vehicles, as wide as many')}{table}"
