@@ -6,7 +6,7 @@ What is ignored is dealt with once, here, before any metric, by the rules of a p
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -143,7 +143,7 @@ def _as_judged(frames: Frames, all_tracks: Resampled, rules: RulesFor) -> Frames
         rules: of what is judged.
     """
     truth, rows = frames.truth, frames.truth_row
-    columns = {
+    columns: dict[str, Any] = {
         "truth": truth.boxes[rows],
         "ignore": truth.ignore[rows],
         "classes": None if truth.classes is None else np.char.lower(truth.classes)[rows],

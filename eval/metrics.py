@@ -71,7 +71,8 @@ class Scores:
     def __getattr__(self, name: str) -> float | int:
         """Return a score by its name."""
         try:
-            return self.__dict__["values"][name]
+            values: dict[str, float | int] = self.__dict__["values"]
+            return values[name]
         except KeyError:
             raise AttributeError(f"there is no score {name}") from None
 

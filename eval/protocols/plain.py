@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,9 @@ def take_truth(truth: GroundTruth, rows: BoolArray) -> GroundTruth:
     """Return the truth of some rows (N,), recorded at the same times."""
     names = ("t", "object_id", "boxes", "motion", "ignore", "classes", "distance", "truncation", "occlusion")
     columns = {name: getattr(truth, name) for name in names}
-    taken = {name: None if column is None else column[rows] for name, column in columns.items()}
+    taken: dict[str, Any] = {
+        name: None if column is None else column[rows] for name, column in columns.items()
+    }
     return replace(truth, frames=truth.frame_times(), **taken)
 
 

@@ -156,4 +156,4 @@ def _path_reader(path: Path, options: ReadingOptions) -> Reader[Any]:
 
 
 def _counting(options: ReadingOptions, first: int | None) -> Reading:
-    return Reading(**{**options, "first_frame": first})
+    return replace(Reading(**options), first_frame=first)

@@ -244,7 +244,17 @@ def _show(counts: list[Count], *, shown: bool) -> None:
 def _columns(rows: list[Any], kind: type) -> dict[str, npt.NDArray[Any]]:
     """One column an attribute, rounded; classes that are not known are left out."""
     names = [f.name for f in dataclasses.fields(kind)]
-    columns = rounded({name: np.array([getattr(row, name) for row in rows]) for name in names})
+    # An empty table has the same kinds of columns as one with rows.
+    kinds = {
+        f.name: {"str": "U1", "int": "i8", "bool": "?"}.get(str(f.type), "f8")
+        for f in dataclasses.fields(kind)
+    }
+    columns = rounded(
+        {
+            name: np.array([getattr(row, name) for row in rows], None if rows else kinds[name])
+            for name in names
+        }
+    )
     columns.pop("counted", None)
     classes = columns.pop("vehicle_class")
     return columns | {"class": classes} if any(classes) else columns

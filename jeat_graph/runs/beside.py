@@ -136,7 +136,8 @@ def recorded_frames(run: str | Path) -> FrameCount | None:
         return None
     if not all(isinstance(number, int) for number in numbers):
         return None
-    return FrameCount(*numbers, fixed=found.get("fixed") is True)
+    first, lowest, highest = numbers
+    return FrameCount(first, lowest, highest, found.get("fixed") is True)
 
 
 def recorded_size(run: str | Path) -> tuple[int, int] | None:

@@ -217,8 +217,8 @@ class _Files(ExitStack):
         from jeat_graph.io.tables.trajectories_io import TrajectoryWriter
 
         super().__init__()
-        named = {CSV.name, *options.formats}
-        suffixes = [one.suffix for one in written_formats() if one.is_table and one.name in named]
+        asked = {CSV.name, *options.formats}
+        suffixes = [one.suffix for one in written_formats() if one.is_table and one.name in asked]
         kinds = ("causal", "smoothed") if config.smoother.engine != "none" else ("causal",)
         writers: dict[str, list[PiecewiseWriter | MeasurementWriter]] = {
             kind: [TrajectoryWriter(run.path(kind + suffix), classes=named) for suffix in suffixes]

@@ -334,3 +334,18 @@ def test_another_begin_than_the_table_has_is_refused(tmp_path, capsys):
     ]
     assert main(command) == 2
     assert "has dates of its own, from 2026-05-01T08:00:00+02:00 on" in capsys.readouterr().err
+
+
+def test_an_empty_table_has_the_columns_kinds_of_a_full_one(tmp_path):
+    from pyarrow import parquet
+
+    head = "t,track_id,left,top,width,height\n"
+    (tmp_path / "none.csv").write_text(head)
+    (tmp_path / "one.csv").write_text(head + "0,1,10,300,80,50\n1,1,500,300,80,50\n2,1,900,300,80,50\n")
+    kinds = []
+    for name in ("none", "one"):
+        out = tmp_path / f"{name}.parquet"
+        line = ["--line", "400,0,400,720", "--crossings", str(out)]
+        assert main(["count", str(tmp_path / f"{name}.csv"), *line]) == 0
+        kinds.append([(field.name, str(field.type)) for field in parquet.read_schema(out)])
+    assert kinds[0] == kinds[1]

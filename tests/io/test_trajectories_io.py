@@ -280,3 +280,12 @@ def test_a_name_of_text_by_frame_is_not_filled_with_csv(name, tmp_path):
     with pytest.raises(DataError, match=r"written_formats\(\)"):
         write_trajectories(Trajectories.empty(), tmp_path / name)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_run_without_classes_has_no_columns_of_them(tmp_path):
+    from jeat_graph.cli.main import main
+
+    rows = "".join(f"{k / 10},rgb,{k},1,30,30,0.9\n" for k in range(3))
+    (tmp_path / "d.csv").write_text("t,sensor,left,top,width,height,score\n" + rows)
+    assert main(["track", str(tmp_path / "d.csv"), "--out", str(tmp_path / "r"), "--image", "640x480"]) == 0
+    assert "class" not in (tmp_path / "r" / "causal.csv").read_text().splitlines()[0]

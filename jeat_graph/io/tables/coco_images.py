@@ -104,7 +104,7 @@ def _rate_of(images: list[tuple[int, dict[str, Any]]], tree: Mapping[str, Any]) 
         if isinstance(video, dict) and isinstance(video.get("id"), int | str) and video["id"] in labels
         if isinstance(video.get("fps"), int | float) and not isinstance(video["fps"], bool)
     }
-    return float(found.pop()) if len(found) == 1 else None
+    return next((float(one) for one in found if one is not None), None) if len(found) == 1 else None
 
 
 def _frame_number(image: Mapping[str, Any], named: Mapping[int, int]) -> float:
