@@ -15,10 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.special import expit, gammaln
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters.box_sides import SIDES, SideInnovations, determinant, squared_distance
 from jeat_graph.filters.model_constants import ModelConstants
 
@@ -128,13 +127,6 @@ def pair_log_ratio(
     p = np.clip(p_detect, *_P_DETECT_BOUNDS)
     ratio = np.log(p / (1.0 - p))[:, None] + density + score - clutter[:, None]
     return np.maximum(ratio, 0.0)
-
-
-def assign(ratio: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return tracks (K,) and boxes (K,) of the assignment whose sum of ln L (N, M) is greatest."""
-    rows, columns = linear_sum_assignment(-ratio)
-    made = ratio[rows, columns] > 0.0
-    return rows[made].astype(np.int64), columns[made].astype(np.int64)
 
 
 def _log_determinant(S: FloatArray) -> FloatArray:

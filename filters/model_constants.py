@@ -129,6 +129,9 @@ class ModelConstants:
         outside_share, outside_gap_s: one with less of its box within the picture ends after so long (s).
         learn_period_s: time between two updates of the sensors' parameters (s).
         remembered_tracks: ended tracks from which sensors' parameters are learnt.
+        most_on_one_spot, spot_overlap, most_touching: of `association.heaps`; far above what detectors give
+            that suppress what they find twice, and far below what a step could not bear.
+        exact_assignment: tracks, or boxes, of one group up to which its assignment is the best one.
     """
 
     velocity_time_s: float = 20.0
@@ -256,3 +259,8 @@ class ModelConstants:
     outside_gap_s: float = 0.2
     learn_period_s: float = 0.5
     remembered_tracks: int = 400
+
+    most_on_one_spot: int = 32
+    spot_overlap: float = 0.5
+    most_touching: int = 128
+    exact_assignment: int = 512

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
+from jeat_graph.association.assignment import assign
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.filters.box_sides import intersection_over_union
 from jeat_graph.filters.model_constants import ModelConstants
@@ -101,9 +101,8 @@ def count_repetition(
         if len(boxes) and len(last.boxes):
             overlap = intersection_over_union(last.boxes, boxes)
             possible = np.where(overlap >= c.repeat_overlap, overlap, 0.0)
-            i, j = linear_sum_assignment(-possible)
-            same = possible[i, j] > 0.0
-            has_after[i[same]], had_before[j[same]] = True, True
+            i, j = assign(possible, c.exact_assignment)
+            has_after[i], had_before[j] = True, True
         if len(last.boxes) and counts.scans > 1:
             kernel = _kernel(last.logits)
             total = total + kernel.sum(axis=1)

@@ -31,6 +31,7 @@ from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.model_tracker import PendingStep
+from jeat_graph.tracking.one_at_a_time import OneAtATime, one_at_a_time
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans
 from jeat_graph.tracking.tracker import Tracker
@@ -54,8 +55,11 @@ def check_saved(tracker: Tracker, what: str) -> None:
         raise ConfigError(f"{what} does not go with tracker.engine={engine}: it is not saved")
 
 
-class LiveTracker:
+@one_at_a_time("causal step save predict drain_smoothed finish")
+class LiveTracker(OneAtATime):
     """A tracker that takes scans in the order in which they arrive.
+
+    Threads that share one wait for each other. Copies are trackers of their own, with one that they step.
 
     Args:
         tracker: a tracker, new or loaded; from now on it is stepped by this object alone.

@@ -183,5 +183,5 @@ class InputWatch:
     def _say(self, kind: str, text: str) -> None:
         if kind not in self._said:
             self._said.add(kind)
-            # Up from here: a judgement, `look`, the tracker's `take_in` and `step`, and whoever called that.
-            warnings.warn(text, InputWarning, stacklevel=6)
+            # Up from here: a judgement, `look`, the tracker's `take_in`, `step`, its lock, and its caller.
+            warnings.warn(text, InputWarning, stacklevel=7)

@@ -26,7 +26,8 @@ class ModelSnapshot(NamedTuple):
         sensors: names of those that had looked.
         classes: votes on the tracks' classes, or None.
         looks: what the tracks look like, or None.
-        order: of the last step's boxes among those given.
+        order: (K,) places of the last step's boxes, as the model has them, among those given.
+        given: how many these were.
         boxes: of the last step, for diagnostics.
     """
 
@@ -35,6 +36,7 @@ class ModelSnapshot(NamedTuple):
     classes: ClassTally | None
     looks: Looks | None
     order: IntArray
+    given: int
     boxes: StepBoxes
 
     def living(self) -> tuple[IntArray, int]:
@@ -105,6 +107,7 @@ class SavedModel:
             "classes": now.classes,
             "looks": now.looks,
             "order": now.order,
+            "given": now.given,
             "boxes": now.boxes,
             "class_ids": self._class_ids,
             "called": self._called,
@@ -129,13 +132,13 @@ class SavedModel:
             raise DataError("is damaged: its sensors are not those of its state")
         if not all(isinstance(name, str) for name in called):
             raise DataError("is damaged: names of classes are none")
-        order, boxes = state["order"], state["boxes"]
-        _check_order(order, len(model.takers()))
+        order, given, boxes = state["order"], state["given"], state["boxes"]
+        _check_order(order, given, len(model.takers()))
         _check_boxes(boxes, len(order) if state["diagnostics"] else 0, len(sensors))
         _check_tally(state["classes"], called)
         _check_looks(state["looks"], len(sensors))
         moment = model.snapshot()
-        tracker.restore(ModelSnapshot(moment, sensors, state["classes"], state["looks"], order, boxes))
+        tracker.restore(ModelSnapshot(moment, sensors, state["classes"], state["looks"], order, given, boxes))
         tracker._finished, tracker._called = bool(state["finished"]), called
         tracker._class_ids = {str(name): int(number) for name, number in state["class_ids"].items()}
         _check_labels(state["model"], len(called))
@@ -145,8 +148,9 @@ class SavedModel:
         return tracker
 
 
-def _check_order(order: Any, count: int) -> None:
-    if not _is_array(order, np.int64, (count,)) or not np.array_equal(np.sort(order), np.arange(count)):
+def _check_order(order: Any, given: Any, count: int) -> None:
+    good = _is_array(order, np.int64, (count,)) and isinstance(given, int) and len(np.unique(order)) == count
+    if not good or given < count or not ((order >= 0) & (order < given)).all():
         raise DataError("is damaged: the order of boxes is none")
 
 

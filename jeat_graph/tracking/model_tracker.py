@@ -28,11 +28,13 @@ from jeat_graph.tracking.classes import ClassTally, Votes, check_names, number_c
 from jeat_graph.tracking.engine import Recorded, StepBoxes, StepInput, TrackEngine
 from jeat_graph.tracking.engines import make_engine
 from jeat_graph.tracking.first_sight import wider
+from jeat_graph.tracking.heaps import Heaps
 from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import diagnostics_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
 from jeat_graph.tracking.model_tables import ClassNames, Places, table_of, with_classes
+from jeat_graph.tracking.one_at_a_time import OneAtATime, one_at_a_time
 from jeat_graph.tracking.prediction import Prediction, of_motion, still_there, time_from
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
@@ -73,12 +75,20 @@ def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
     return min(told, key=lambda one: float(one[7] + one[8])) if told else None
 
 
-class ModelTracker(Updates, SavedModel):
+@one_at_a_time(
+    "step take_in hand_over snapshot restore begin_anew number_on_from takers living last_looks meet causal "
+    "rows_below_least predict last_updates last_measurements smoothed drain_smoothed settle finish state "
+    "hypotheses learnt sensor_states"
+)
+class ModelTracker(Updates, SavedModel, OneAtATime):
     """An engine as a tracker.
 
     Sensors have any names and are known from their first scan on. Boxes are reported up to the edge of the
     picture where `output.clip` says so and the detectors' end there, else as they are. With a fixed lag
     rows are final after twice `smoother.lag_s`, else when their track has ended.
+
+    Threads that share a tracker wait for each other; those with a tracker each do not. `copy.copy` and
+    `copy.deepcopy` give a tracker of its own in the same state.
 
     Args:
         config: a configuration, the name of a preset, or of a YAML file.
@@ -118,6 +128,7 @@ class ModelTracker(Updates, SavedModel):
         self._model: TrackEngine = make_engine(config, constants)
         if diagnostics and not self._model.has_fit:
             raise JeatGraphError(f"engine {self._model.name} has no diagnostics")
+        self._heaps = Heaps(config.tracker.engine, self.constants)
         self._common = CommonPicture.of(config)
         self._watch = InputWatch(config)
         self._classes: ClassTally | None = None
@@ -125,7 +136,8 @@ class ModelTracker(Updates, SavedModel):
         self._called: list[str] = []  # names of classes by number
         self._looks: Looks | None = None
         self._causal: Trajectories | None = None
-        self._order: IntArray = _NO_BOXES
+        # Of the last step: places of the boxes in the model's order, and how many were given.
+        self._order, self._given = _NO_BOXES, 0
         self._boxes = StepBoxes.none()
         self._instants = SmoothedInstants(config)
         self._finished = False
@@ -220,25 +232,27 @@ class ModelTracker(Updates, SavedModel):
             raise DataError("this engine compares no embeddings; leave them or the engine away")
         embeddings = embeddings_of(self._looks, batch) if seen else None
         self._watch.look(batch)  # before anything changes: a user may have made warnings errors
+        kept = self._heaps.kept(batch)
         self._declare(batch)
         # Several scans of one sensor at one time are one.
         codes = [self._looked.index(scan.sensor) for scan in batch]
         sensor = np.repeat(codes, [len(scan) for scan in batch]).astype(np.int64)
         order = np.argsort(sensor, kind="stable")
+        order = order if kept is None else order[kept[order]]  # those that count
         looking = np.array(sorted(set(codes)), dtype=np.int64)
         boxes = np.concatenate([scan.boxes for scan in batch])[order]
         scores = np.concatenate([scan.scores for scan in batch])[order]
-        numbers = np.bincount(sensor, minlength=len(self._looked))[looking].astype(np.int64)
+        numbers = np.bincount(sensor[order], minlength=len(self._looked))[looking].astype(np.int64)
         compared = None if embeddings is None else self._compare(embeddings, sensor)
         alike = None if compared is None else compared.log_ratio[:, order]
         self._model.take(StepInput(t, looking, numbers, boxes, scores, alike, _surest_motion(batch)))
-        self._order, self._causal = order, None
+        self._order, self._given, self._causal = order, len(sensor), None
         if self._diagnostics:
             self._boxes = StepBoxes(t, sensor[order], boxes)
         self._count_classes(batch)
         if compared is not None:
-            detection = np.arange(len(order), dtype=np.int64)
-            self._looks = remember(compared, self.takers(len(order)), detection, self._model.identities())
+            detection = np.arange(len(sensor), dtype=np.int64)
+            self._looks = remember(compared, self.takers(len(sensor)), detection, self._model.identities())
 
     def hand_over(self, taken: PendingStep | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
@@ -249,12 +263,13 @@ class ModelTracker(Updates, SavedModel):
     def snapshot(self) -> ModelSnapshot:
         """Copy all that the next step depends on; the smoothers are not part of it."""
         return ModelSnapshot(
-            self._model.snapshot(), self._looked, self._classes, self._looks, self._order, self._boxes
+            *(self._model.snapshot(), self._looked, self._classes, self._looks),
+            *(self._order, self._given, self._boxes),
         )
 
     def restore(self, snapshot: ModelSnapshot) -> None:
         """Go back to a snapshot of this tracker."""
-        moment, self._looked, self._classes, self._looks, self._order, self._boxes = snapshot
+        moment, self._looked, self._classes, self._looks, self._order, self._given, self._boxes = snapshot
         self._model.restore(moment)
         self._find_places()
         self._causal = None
@@ -267,7 +282,8 @@ class ModelTracker(Updates, SavedModel):
         if self.time is not None:
             self._model.begin_anew(t)
             # The model has no last step now, so there are no boxes of one either.
-            self._order, self._boxes, self._causal = _NO_BOXES, StepBoxes.none(), None
+            self._order, self._given = _NO_BOXES, 0
+            self._boxes, self._causal = StepBoxes.none(), None
             self._instants.begin_anew()
 
     def number_on_from(self, identity: int) -> None:
@@ -277,7 +293,7 @@ class ModelTracker(Updates, SavedModel):
     def takers(self, count: int) -> IntArray:
         """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
         out = np.zeros(count, dtype=np.int64)
-        if count == len(self._order):
+        if count == self._given:
             out[self._order] = self._model.takers()
         return out
 
@@ -458,9 +474,9 @@ class ModelTracker(Updates, SavedModel):
         if self._classes is None and all(scan.classes is None for scan in batch):
             return
         self._class_ids = number_classes(self._class_ids, batch)
-        votes = Votes.of_batch(batch, np.arange(len(self._order), dtype=np.int64))
+        votes = Votes.of_batch(batch, np.arange(self._given, dtype=np.int64))
         tally = self._classes or ClassTally.start()
-        self._classes = tally.after(self._model.living(), self.takers(len(self._order)), votes)
+        self._classes = tally.after(self._model.living(), self.takers(self._given), votes)
         self._called += [name for name in self._classes.names.tolist() if name not in self._called]
 
     def _called_now(self) -> tuple[IntArray | None, FloatArray | None]:

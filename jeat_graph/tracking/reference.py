@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.association import likelihood_ratio
+from jeat_graph.association.assignment import assign
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import (
     box_sides,
@@ -275,7 +276,7 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     clutter = likelihood_ratio.clutter_log_density(size, float(state.leftovers[k]), state.picture, c)
     present = tracks.presence[:, VISIBLE] * p_detect
     ratio = likelihood_ratio.pair_log_ratio(density, present, score, clutter)
-    track, box = likelihood_ratio.assign(by_looks(ratio, scan.alike))
+    track, box = assign(by_looks(ratio, scan.alike), c.exact_assignment)
     seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track, box]
     nis = (seen[0].mean(axis=2) ** 2 / seen[1].mean(axis=(2, 3))).sum(axis=1)
     indifference = float(state.sensors.indifference[k])

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal, multivariate_t
 
 from jeat_graph.association import likelihood_ratio
+from jeat_graph.association.assignment import assign
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.model_constants import ModelConstants
 
@@ -38,7 +39,7 @@ def best_sum(ratio):
 def test_assignment_is_the_best_of_all(seed, shape, share):
     rng = np.random.default_rng(seed)
     ratio = np.maximum(rng.normal(2.0, 4.0, shape), 0.0) * (rng.random(shape) < share)
-    track, box = likelihood_ratio.assign(ratio)
+    track, box = assign(ratio)
     assert len(set(track)) == len(track)
     assert len(set(box)) == len(box)
     assert (ratio[track, box] > 0.0).all()
@@ -92,7 +93,7 @@ def test_outside_the_gates_no_pair_is_made():
         np.array([[0.0, -np.inf]]), np.array([0.5]), np.zeros((1, 2)), np.array([-8.0])
     )
     np.testing.assert_allclose(ratio, [[8.0, 0.0]])
-    track, box = likelihood_ratio.assign(ratio)
+    track, box = assign(ratio)
     assert (track.tolist(), box.tolist()) == ([0], [0])
 
 

@@ -24,7 +24,7 @@ def tracker() -> Tracker:
     tracker = Tracker(load_config("default"))
     for k in range(40):
         boxes = [[100.0 + 4 * k, 100.0 + 150 * i, 60.0, 40.0] for i in range(3)]
-        for name in tracker.sensor_names:
+        for name in ("rgb", "evt"):
             tracker.step([(0.1 * k + 0.001 * len(name), name, boxes, [0.9] * 3)])
     return tracker
 
@@ -178,3 +178,83 @@ def test_stream_says_it_in_one_line(tmp_path, capsys):
     assert main(["stream", "--checkpoint", str(path), "--image", "640x480"]) == 2
     said = capsys.readouterr().err
     assert said == f"jeat-graph stream: {path}: is no saved tracker (BadZipFile)\n"
+
+
+FORGED = {
+    "tracks.hits": [-1e40, -1e-9, 1e40],
+    "tracks.misses": [-1e40, -1.0],
+    "tracks.stationary_hits": [1e9],
+    "tracks.total_weight": [-1.0],
+    "tracks.detections": [0.0, -1.0],
+    "tracks.overlap": [-0.1, 2.0],
+    "tracks.found": [2],
+    "tracks.owner": [-1, 99],
+    "tracks.last_s": [np.nan, np.inf, 1e6],
+    "tracks.born_s": [1e6, np.nan],
+    "tracks.confirmed_s": [np.nan, 1e6],
+    "tracks.last_box_s": [np.inf],
+    "tracks.used": [-1, 1 << 40],
+    "tracks.presence": [-0.1, 0.5, 2.0],
+    "tracks.recent_misses": [-1.0],
+    "tracks.real": [1.5, -0.5],
+    "tracks.sees": [-0.5, 1.5],
+    "tracks.covariance": [-1.0, 0.0, np.nan],
+    "tracks.mean": [1e71, np.nan],
+    "sensor0.leftovers": [-1.0],
+    "sensor0.false_boxes": [-5.0],
+    "sensor0.period_s": [-1.0, np.inf],
+    "sensor0.last_look_s": [1e9, np.inf],
+    "sensor0.boxes": [-1.0],
+    "sensor0.repeated": [1e9],
+    "sensor0.boxes_at_edge": [-1.0],
+    "process_noise.jerk": [1e3, -1e3],
+    "camera.shift": [0.0, -1.0],
+    "gaps.ended": [-1.0],
+    "gaps.ended_well": [1e9],
+    "belief.p_detect": [0.0, 1.0, -1.0],
+    "belief.unseen": [0.0, 1.0],
+    "belief.noise_share": [0.0, 1.0],
+    "belief.prior_odds": [1e5],
+    "offsets.weight": [-1.0],
+    "log_side_variance": [1e4],
+    "next_id": [0, 1 << 62 | 1],
+    "learnt_s": [np.inf, 1e9],
+    "t": [np.nan, np.inf, -1e6],
+    "histories.t": [np.nan, -1e9, 1e9],
+    "histories.dt": [-1.0, np.nan],
+    "histories.real": [2.0],
+    "histories.given": [0, -3],
+    "histories.covariance": [-1.0],
+    "histories.predicted_mean": [1e71],
+    "histories.given_missed": [-2.0, np.nan],
+    "histories.missed": [-1.0, np.nan],
+}
+
+
+@pytest.mark.parametrize("name", FORGED)
+def test_a_state_that_no_step_leaves_behind_is_refused(tracker, name):
+    """What a step divides by, takes the logarithm of, counts up from, or orders by."""
+    model = tracker._model
+    good = dict(model.state())
+    model.set_state(good)
+    place = {"histories.t": 1}.get(name, 0)
+    for value in FORGED[name]:
+        forged = good[name].copy()
+        forged.reshape(-1)[place] = value
+        with pytest.raises(ValueError, match=r"[a-z]"):
+            model.set_state({**good, name: forged})
+    assert {key: column.tobytes() for key, column in model.state().items()} == {
+        key: column.tobytes() for key, column in good.items()
+    }
+
+
+def test_a_covariance_that_is_symmetric_but_not_positive_is_refused(tracker):
+    good = dict(tracker._model.state())
+    covariance = good["tracks.covariance"].copy()
+    block = covariance.reshape(-1, 7, 7)[0]
+    std = np.sqrt(np.diag(block))
+    # Each pair could be: all three together cannot.
+    for i, j, correlation in ((0, 1, 0.9), (1, 2, 0.9), (0, 2, -0.9)):
+        block[i, j] = block[j, i] = correlation * std[i] * std[j]
+    with pytest.raises(ValueError, match="no covariance"):
+        tracker._model.set_state({**good, "tracks.covariance": covariance})

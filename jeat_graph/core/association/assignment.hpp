@@ -1,7 +1,9 @@
 // The assignment of greatest sum among the pairs that are possible, each row and column at most once.
 //
 // Pairs fall into groups that share no row and no column (connected components); each is solved alone by shortest
-// augmenting paths (Jonker and Volgenant, Computing 38, 1987), where staying alone costs nothing.
+// augmenting paths (Jonker and Volgenant, Computing 38, 1987), where staying alone costs nothing. These take a time that
+// grows with the cube of the group: of a group with more rows or columns than `exact`, which no traffic has, the pair of
+// greatest gain is made, then that of what is left.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +11,8 @@
 #include <limits>
 #include <numeric>
 #include <vector>
+
+#include "interruption.hpp"
 
 namespace jeat::association {
 
@@ -20,7 +24,8 @@ struct Pair {
 class Assignment {
 public:
     // Return which of the pairs are made, in the order of their rows.
-    const std::vector<std::size_t>& solve(const std::vector<Pair>& pairs, std::size_t rows, std::size_t columns) {
+    const std::vector<std::size_t>& solve(const std::vector<Pair>& pairs, std::size_t rows, std::size_t columns,
+                                          double exact) {
         made_.clear();
         parent_.resize(rows + columns);
         std::iota(parent_.begin(), parent_.end(), std::size_t{0});
@@ -35,13 +40,14 @@ public:
             return pairs[a].column < pairs[b].column;
         });
         place_.assign(rows + columns, 0);
+        taken_.resize(rows + columns);
         for (std::size_t begin = 0, end; begin < order_.size(); begin = end) {
             end = begin;
             while (end < order_.size() && group_[order_[end]] == group_[order_[begin]]) ++end;
             if (end - begin == 1) {
                 made_.push_back(order_[begin]);
-            } else {
-                solve_group(pairs, rows, begin, end);
+            } else if (!solve_group(pairs, rows, begin, end, exact)) {
+                take_greatest(pairs, rows, begin, end);
             }
         }
         std::sort(made_.begin(), made_.end(),
@@ -59,8 +65,26 @@ private:
         if (a != b) parent_[std::max(a, b)] = std::min(a, b);
     }
 
-    // Rows and columns of the group get places; each row has a column of its own, of gain 0, to stay alone.
-    void solve_group(const std::vector<Pair>& pairs, std::size_t rows, std::size_t begin, std::size_t end) {
+    // Make the pair of greatest gain, again and again; of equals that of the first row, then of the first column.
+    void take_greatest(const std::vector<Pair>& pairs, std::size_t rows, std::size_t begin, std::size_t end) {
+        std::sort(order_.begin() + static_cast<std::ptrdiff_t>(begin), order_.begin() + static_cast<std::ptrdiff_t>(end),
+                  [&](std::size_t a, std::size_t b) {
+                      const Pair &x = pairs[a], &y = pairs[b];
+                      if (x.gain != y.gain) return x.gain > y.gain;
+                      return x.row != y.row ? x.row < y.row : x.column < y.column;
+                  });
+        for (std::size_t k = begin; k < end; ++k) taken_[pairs[order_[k]].row] = taken_[rows + pairs[order_[k]].column] = 0;
+        for (std::size_t k = begin; k < end; ++k) {
+            char &row = taken_[pairs[order_[k]].row], &column = taken_[rows + pairs[order_[k]].column];
+            if (row || column) continue;
+            row = column = 1;
+            made_.push_back(order_[k]);
+        }
+    }
+
+    // Rows and columns of the group get places; each row has a column of its own, of gain 0, to stay alone. False where
+    // the group is too large.
+    bool solve_group(const std::vector<Pair>& pairs, std::size_t rows, std::size_t begin, std::size_t end, double exact) {
         group_rows_.clear();
         group_columns_.clear();
         for (std::size_t k = begin; k < end; ++k) {
@@ -72,6 +96,7 @@ private:
         }
         std::sort(group_columns_.begin(), group_columns_.end());
         group_columns_.erase(std::unique(group_columns_.begin(), group_columns_.end()), group_columns_.end());
+        if (static_cast<double>(std::max(group_rows_.size(), group_columns_.size())) > exact) return false;
         for (std::size_t k = 0; k < group_columns_.size(); ++k) place_[rows + group_columns_[k]] = k;
         const std::size_t n = group_rows_.size(), m = group_columns_.size(), width = m + n;
         first_.assign(n + 1, begin);
@@ -86,6 +111,7 @@ private:
         column_row_.assign(width, n);
         row_pair_.assign(n, end);
         for (std::size_t start = 0; start < n; ++start) {
+            may_be_interrupted();
             distance_.assign(width, kInfinity);
             from_.assign(width, n);
             via_.assign(width, end);
@@ -143,6 +169,7 @@ private:
         }
         for (std::size_t r = 0; r < n; ++r)
             if (row_pair_[r] != end) made_.push_back(order_[row_pair_[r]]);
+        return true;
     }
 
     // The column that a row has, before it gets another one.
@@ -154,7 +181,7 @@ private:
     std::vector<std::size_t> parent_, order_, group_, place_, made_, group_rows_, group_columns_, first_;
     std::vector<std::size_t> column_row_, row_pair_, from_, via_, touched_;
     std::vector<double> row_price_, column_price_, distance_;
-    std::vector<char> done_;
+    std::vector<char> done_, taken_;
 };
 
 }  // namespace jeat::association

@@ -46,8 +46,14 @@ template <class Word, class Decode> void bind_decoder(nb::module_& module, const
             check(limits.first >= 0 && limits.first <= 1 << 16 && limits.second >= 0 && limits.second <= 1 << 16,
                   "a picture is at most 65536 px wide and high");
             const auto given = span(words);
-            nb::gil_scoped_release release;
-            return decode(given, state, columns, edges, Limits{limits.first, limits.second});
+            // Another thread may use the state meanwhile: the places that are written follow from a copy.
+            DecoderState now = state;
+            const auto used = [&] {
+                const nb::gil_scoped_release release;
+                return decode(given, now, columns, edges, Limits{limits.first, limits.second});
+            }();
+            state = now;
+            return used;
         },
         nb::arg("words").noconvert(), nb::arg("state"), nb::arg("out").noconvert(),
         nb::arg("triggers").noconvert(), nb::arg("limits"), doc);
@@ -62,8 +68,13 @@ template <class Word, class Encode> void bind_encoder(nb::module_& module, const
             check_lengths({t.size(), x.size(), y.size(), polarity.size()});
             const Events events{span(t), span(x), span(y), span(polarity)};
             const auto room = span(words);
-            nb::gil_scoped_release release;
-            return encode(events, room, state);
+            EncoderState now = state;
+            const auto done = [&] {
+                const nb::gil_scoped_release release;
+                return encode(events, room, now);
+            }();
+            state = now;
+            return done;
         },
         nb::arg("t").noconvert(), nb::arg("x").noconvert(), nb::arg("y").noconvert(),
         nb::arg("polarity").noconvert(), nb::arg("words").noconvert(), nb::arg("state"), doc);

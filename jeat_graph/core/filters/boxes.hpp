@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "filters/singer.hpp"
@@ -47,30 +49,61 @@ inline Sides expected_corners(const double* mean) {
     return {x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0};
 }
 
-// Boxes by their left sides: which of them may reach into an interval, without a look at the rest.
+// Boxes by their left sides: which of them may reach into an interval, without a look at the rest. Where there are
+// many they are also kept by width, each class twice as wide as the one before: one wide box among many narrow ones
+// is no reason to look at all of them. A box that lies nowhere (NaN) is near none.
 class ByLeft {
 public:
-    explicit ByLeft(const std::vector<Sides>& boxes) : boxes_(boxes), order_(boxes.size()) {
-        for (std::size_t k = 0; k < boxes.size(); ++k) order_[k] = k;
+    explicit ByLeft(const std::vector<Sides>& boxes) : boxes_(boxes) {
+        order_.reserve(boxes.size());
+        for (std::size_t k = 0; k < boxes.size(); ++k) {
+            if (std::isnan(boxes[k].left)) continue;
+            order_.push_back(k);
+            widest_ = std::max(widest_, boxes[k].width());
+        }
         std::sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
             return boxes[a].left != boxes[b].left ? boxes[a].left < boxes[b].left : a < b;
         });
-        for (const Sides& box : boxes) widest_ = std::max(widest_, box.width());
+        if (order_.size() > kFewBoxes) sort_by_width();
     }
     // Call visit(k) for every box whose left side lies in [low, high].
     template <class Visit> void with_left_in(double low, double high, Visit visit) const {
-        auto at = std::lower_bound(order_.begin(), order_.end(), low,
-                                   [&](std::size_t k, double value) { return boxes_[k].left < value; });
-        for (; at != order_.end() && boxes_[*at].left <= high; ++at) visit(*at);
+        visit_between(order_, low, high, visit);
     }
     // Call visit(k) for every box that may overlap another one.
     template <class Visit> void near(const Sides& box, Visit visit) const {
-        with_left_in(box.left - widest_, box.right, visit);
+        if (classes_.empty()) return visit_between(order_, box.left - widest_, box.right, visit);
+        for (const Class& one : classes_) visit_between(one.order, box.left - one.widest, box.right, visit);
     }
 
 private:
+    static constexpr std::size_t kFewBoxes = 256;
+    struct Class {
+        int exponent;
+        double widest = 0.0;
+        std::vector<std::size_t> order{};
+    };
+
+    void sort_by_width() {
+        for (const std::size_t k : order_) {
+            const double width = boxes_[k].width();
+            const int exponent = width > 0.0 ? std::ilogb(width) : std::numeric_limits<int>::min();
+            auto at = std::find_if(classes_.begin(), classes_.end(), [&](const Class& one) { return one.exponent == exponent; });
+            if (at == classes_.end()) at = classes_.insert(at, Class{exponent});
+            at->widest = std::max(at->widest, width);
+            at->order.push_back(k);
+        }
+    }
+    template <class Visit>
+    void visit_between(const std::vector<std::size_t>& order, double low, double high, Visit& visit) const {
+        auto at = std::lower_bound(order.begin(), order.end(), low,
+                                   [&](std::size_t k, double value) { return boxes_[k].left < value; });
+        for (; at != order.end() && boxes_[*at].left <= high; ++at) visit(*at);
+    }
+
     const std::vector<Sides>& boxes_;
     std::vector<std::size_t> order_;
+    std::vector<Class> classes_;
     double widest_ = 0.0;
 };
 

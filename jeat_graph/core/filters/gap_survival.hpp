@@ -1,4 +1,4 @@
-// How long an unseen track is reported; the formulas are in filters/gapurvival.py.
+// How long an unseen track is reported; the formulas are in filters/gap_survival.py.
 #pragma once
 
 #include <algorithm>

@@ -130,7 +130,8 @@ struct Bounds {
     JEAT_ONE(outside_share) \
     JEAT_ONE(outside_gap_s) \
     JEAT_ONE(learn_period_s) \
-    JEAT_ONE(remembered_tracks)
+    JEAT_ONE(remembered_tracks) \
+    JEAT_ONE(exact_assignment)
 // clang-format on
 
 struct ModelConstants {

@@ -33,7 +33,7 @@ struct RepeatCounts {
                     if (overlap >= c.repeat_overlap) pairs.push_back({i, j, overlap});
                 });
             association::Assignment assignment;
-            for (const std::size_t k : assignment.solve(pairs, last_boxes.size(), now.size()))
+            for (const std::size_t k : assignment.solve(pairs, last_boxes.size(), now.size(), c.exact_assignment))
                 has_after[pairs[k].row] = had_before[pairs[k].column] = 1;
         }
         if (has_last && scans > 1) {

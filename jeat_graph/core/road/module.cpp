@@ -3,6 +3,7 @@
 #include <nanobind/stl/tuple.h>
 
 #include "arrays.hpp"
+#include "exclusive.hpp"
 #include "road/causal.hpp"
 #include "road/chain_rows.hpp"
 
@@ -47,6 +48,12 @@ Belief belief_of(const nb::handle& config, In1D size, In2D size_cov, In3<double>
     return out;
 }
 
+// A filter that one thread uses at a time.
+struct Shared {
+    Filter filter;
+    Exclusive use;
+};
+
 Filter filter_of(const Camera& camera, const nb::object& config, In1D size, In2D size_cov, In3<double> extremes,
                  In2D errors) {
     check(errors.shape(1) == 2, "two errors for each sensor");
@@ -61,11 +68,13 @@ void check_rows(std::initializer_list<std::size_t> rows, std::initializer_list<s
     for (const std::size_t one : widths) check(one == width, "rows of another width than expected");
 }
 
-void take(Filter& filter, double t, In<std::int64_t> track_ids, In<std::int64_t> sensors, In2D z, In2D r,
+void take(Shared& shared, double t, In<std::int64_t> track_ids, In<std::int64_t> sensors, In2D z, In2D r,
           In2D coloured_std, In2D log_size, In2D size_var) {
     check_rows({track_ids.size(), sensors.size(), z.shape(0), r.shape(0), coloured_std.shape(0), log_size.shape(0),
                 size_var.shape(0)},
                {z.shape(1), r.shape(1), coloured_std.shape(1), log_size.shape(1), size_var.shape(1)}, 2);
+    const Exclusive::Hold hold(shared.use);
+    Filter& filter = shared.filter;
     for (const std::int64_t sensor : span(sensors))
         check(sensor >= 0 && static_cast<std::size_t>(sensor) < filter.sensors(), "no such sensor");
     const nb::gil_scoped_release release;
@@ -76,7 +85,9 @@ void take(Filter& filter, double t, In<std::int64_t> track_ids, In<std::int64_t>
     }
 }
 
-std::tuple<Out<std::int64_t>, Out2<double>, Out2<double>> read(Filter& filter, double t, In<std::int64_t> track_ids) {
+std::tuple<Out<std::int64_t>, Out2<double>, Out2<double>> read(Shared& shared, double t, In<std::int64_t> track_ids) {
+    const Exclusive::Hold hold(shared.use);
+    Filter& filter = shared.filter;
     const std::size_t room = track_ids.size();
     Buffer<std::int64_t> known(room);
     Buffer<double> mean(room * STATES), variance(room * STATES);
@@ -203,10 +214,10 @@ void bind(nb::module_& module) {
              nb::arg("distortion"),
              "rotation: road to camera (3, 3); position (3,) in m; focal: fx, fy; centre: cx, cy; picture: width and\n"
              "height (px); distortion: k1, k2.");
-    nb::class_<Filter>(module, "Filter", "All tracks on the road; see jeat_graph.road.causal.")
-        .def("__init__", [](Filter* self, const Camera& camera, const nb::object& config, In1D size, In2D size_cov,
+    nb::class_<Shared>(module, "Filter", "All tracks on the road; see jeat_graph.road.causal.")
+        .def("__init__", [](Shared* self, const Camera& camera, const nb::object& config, In1D size, In2D size_cov,
                             In3<double> extremes, In2D errors) {
-                 new (self) Filter(filter_of(camera, config, size, size_cov, extremes, errors));
+                 new (self) Shared{filter_of(camera, config, size, size_cov, extremes, errors), {}};
              },
              nb::arg("camera"), nb::arg("config"), whole("size"), whole("size_cov"), whole("extremes"), whole("errors"),
              "config: a RoadFilterConfig; size (3,), size_cov (3, 3): of a vehicle not seen yet; extremes: of the fleet;\n"
@@ -218,7 +229,11 @@ void bind(nb::module_& module) {
         .def("read", read, nb::arg("t"), whole("track_ids"),
              "States at time t (s) of those of the tracks (N,) that stand on the road and are vehicles: identities (K,),\n"
              "means (K, 8) and variances (K, 8) as road_terms has them.")
-        .def("forget", &Filter::forget, nb::arg("t"), nb::arg("silence_s"),
+        .def("forget", [](Shared& shared, double t, double silence_s) {
+                 const Exclusive::Hold hold(shared.use);
+                 shared.filter.forget(t, silence_s);
+             },
+             nb::arg("t"), nb::arg("silence_s"),
              "Remove tracks without a box for longer than silence_s.");
     module.def("predict", [](Out<double> mean, Out2<double> cov, double dt, const nb::object& config) {
                    Borrowed borrowed(mean, cov);

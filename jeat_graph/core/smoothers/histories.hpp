@@ -14,6 +14,7 @@
 
 #include "filters/gap_survival.hpp"
 #include "filters/singer.hpp"
+#include "interruption.hpp"
 #include "smoothers/state_rts.hpp"
 
 namespace jeat::smoothers {
@@ -173,6 +174,7 @@ public:
                 if (to != i) std::swap(living_[to], living_[i]);
                 ++to;
             } else {
+                may_be_interrupted();  // what has been given out until now is so once and for all
                 give_out(living_[i], std::numeric_limits<double>::infinity(), gaps, c, rows_, true);
             }
         }
@@ -182,8 +184,10 @@ public:
     // Rows of living tracks as of now; they stay.
     Rows preview(const GapCounts& gaps, const ModelConstants& c) {
         Rows out = rows_;
-        for (History& history : living_)
+        for (History& history : living_) {
+            may_be_interrupted();
             give_out(history, std::numeric_limits<double>::infinity(), gaps, c, out, false);
+        }
         return out;
     }
 

@@ -1,13 +1,18 @@
 // Binds the tracker's step.
 #include <array>
+#include <cmath>
 #include <optional>
+#include <span>
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/tuple.h>
 
 #include "arrays.hpp"
+#include "association/heaps.hpp"
+#include "exclusive.hpp"
+#include "signals.hpp"
 #include "smoothers/histories.hpp"
-#include "tracking/saved.hpp"
+#include "tracking/state_check.hpp"
 #include "tracking/step.hpp"
 
 namespace jeat::tracking {
@@ -22,6 +27,15 @@ using Named = nb::typed<nb::dict, nb::str, nb::object>;
 
 // After so long without any scan all tracks are over: longer predictions outgrow a double's digits (s).
 constexpr double kLongestSilenceS = 300.0;
+
+// Tracks and boxes up to which a step is no long one.
+constexpr std::size_t kFewRows = 512;
+
+bool finite(std::span<const double> values) {
+    for (const double value : values)
+        if (!std::isfinite(value)) return false;
+    return true;
+}
 
 // All that the next step depends on, and what the last one told.
 struct Moment {
@@ -85,8 +99,12 @@ public:
         : now_{State(constants_of(constants)), {}}, step_(now_.state), smooths_(lag_s >= 0.0), histories_(lag_s) {
         if (known) now_.state.width = width, now_.state.height = height, now_.state.picture_known = true;
     }
-    Model(const Model&) = delete;
+    Model(const Model& other)
+        : now_(other.now_), step_(now_.state), smooths_(other.smooths_), histories_(other.histories_),
+          record_(other.record_) {}
     Model& operator=(const Model&) = delete;
+
+    Exclusive use;
 
     void declare_sensor(double even_logit) {
         now_.state.declare_sensor(even_logit);
@@ -95,16 +113,20 @@ public:
     void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
               const std::optional<In2<double>>& alike, const std::optional<In<double>>& motion) {
         State& state = now_.state;
+        check(std::isfinite(t), "no such time");
+        check(!state.started || t >= state.t, "a time before that of the last step");
         check_lengths({sensors.size(), numbers.size()});
         check_lengths({boxes.shape(0), logits.size()});
+        check(finite(span(boxes)) && finite(span(logits)), "boxes and logits are finite");
         check(boxes.shape(1) == 4, "boxes have four sides");
         if (alike) check(alike->shape(0) == state.tracks.size(), "another number of tracks is compared");
         if (alike) check_lengths({alike->shape(1), logits.size()});
+        if (alike) check(finite(span(*alike)), "what looks say is finite");
         std::optional<PictureMotion> moved;
         if (motion) {
             check_lengths({motion->size(), kMotionNumbers});
             moved = PictureMotion::of(motion->data());
-            check(moved->span_s > 0.0, "a motion takes time");
+            check(moved->span_s > 0.0 && finite(span(*motion)), "a motion takes time");
         }
         scans_.resize(sensors.size());
         std::size_t at = 0;
@@ -123,13 +145,27 @@ public:
         }
         check(at == logits.size(), "more boxes than said");
         const nb::gil_scoped_release release;
+        const auto motion_told = moved ? &*moved : nullptr;
+        if (state.tracks.size() + logits.size() <= kFewRows) return run(t, motion_told);
+        // A long step is ended by signals, and has not been then.
+        const Moment before = now_;
+        const HeedsSignals heeds;
+        try {
+            run(t, motion_told);
+        } catch (...) {
+            now_ = before;
+            throw;
+        }
+    }
+    void run(double t, const PictureMotion* moved) {
+        const State& state = now_.state;
         Record* const record = smooths_ ? &record_ : nullptr;
         const bool begins_anew = state.started && t - state.t >= kLongestSilenceS;
         record_.begin(t);
         if (begins_anew) record_.begins_anew = true, step_.begin_anew(t);
         for (Scan& scan : scans_)
             if (begins_anew) scan.alike = {nullptr, 0, 0};
-        step_.run(t, scans_, moved && !begins_anew ? &*moved : nullptr, reported_, record);
+        step_.run(t, scans_, begins_anew ? nullptr : moved, reported_, record);
         write_answer(t);
         step_.end_tracks(record);
     }
@@ -157,6 +193,7 @@ public:
     }
 
     void begin_anew(double t) {
+        check(std::isfinite(t), "no such time");
         step_.begin_anew(t);
         now_.answer = {};
         histories_.end_all(now_.state.gaps, now_.state.constants);
@@ -209,15 +246,27 @@ public:
         return array_of(out);
     }
 
-    Table smoothed() { return table(histories_.preview(now_.state.gaps, now_.state.constants)); }
+    Table smoothed() {
+        const auto rows = [&] {
+            const nb::gil_scoped_release release;
+            const HeedsSignals heeds;
+            return histories_.preview(now_.state.gaps, now_.state.constants);
+        }();
+        return table(rows);
+    }
     std::size_t waiting() { return histories_.rows().size(); }
     Table drain() {
         Table out = table(histories_.rows());
         histories_.rows().clear();
         return out;
     }
+    // Where a signal ends it, it can be called once more.
     Table finish() {
-        histories_.end_all(now_.state.gaps, now_.state.constants);
+        {
+            const nb::gil_scoped_release release;
+            const HeedsSignals heeds;
+            histories_.end_all(now_.state.gaps, now_.state.constants);
+        }
         return drain();
     }
 
@@ -310,9 +359,28 @@ private:
 }  // namespace
 
 void bind(nb::module_& module) {
+    module.def("kept_boxes", [](In2<double> boxes, In<double> scores, const nb::object& constants) {
+                   check_lengths({boxes.shape(0), scores.size()});
+                   check(boxes.shape(1) == 4 && finite(span(boxes)) && finite(span(scores)), "boxes have four sides, and scores");
+                   const auto number = [&](const char* name) { return nb::cast<double>(constants.attr(name)); };
+                   const double on_one_spot = number("most_on_one_spot"), overlap = number("spot_overlap");
+                   const double touching = number("most_touching");
+                   const std::span<const Sides> sides(reinterpret_cast<const Sides*>(boxes.data()), boxes.shape(0));
+                   const auto kept = [&] {
+                       const nb::gil_scoped_release release;
+                       const HeedsSignals heeds;
+                       return association::kept_boxes(sides, span(scores), on_one_spot, overlap, touching);
+                   }();
+                   return array_of(kept);
+               },
+               nb::arg("boxes").noconvert(), nb::arg("scores").noconvert(), nb::arg("constants"),
+               "Places (K,) of the boxes (M, 4) left, top, right, bottom (px) with scores (M,) that count; see\n"
+               "jeat_graph.association.heaps.");
     nb::class_<Record>(module, "Record", "What the filter did in a step, for the smoother.")
         .def("track_ids", [](const Record& record) { return array_of(record.track_id); },
              "Identities of the tracks after it, before any ended (N,).")
+        .def("__deepcopy__", [](const Record& record, const nb::object&) { return new Record(record); },
+             nb::arg("memo"), "The same once more.")
         .def("scans", [](const Record& record, const Model& model) { return scans_of(record, model.constants()); },
              nb::arg("model"),
              "Scan by scan, in the order they were taken in: index of the sensor (K,), number of tracks after it (K,),\n"
@@ -325,6 +393,8 @@ void bind(nb::module_& module) {
              "Gaps that outlasted each bin, and those that ended well (2, 9), before tracks ended.")
         .def("gaps_after", [](const Record& record) { return gaps_of(record.gaps_after); }, "The same after it.");
     nb::class_<Moment>(module, "Moment", "All that the next step depends on; the smoother is no part of it.")
+        .def("__deepcopy__", [](const Moment& moment, const nb::object&) { return new Moment(moment); },
+             nb::arg("memo"), "The same once more.")
         .def("identities", [](const Moment& moment) { return array_of(moment.state.tracks.track_id); },
              "Identities of the living tracks (N,).")
         .def("born", [](const Moment& moment) { return moment.state.next_id - 1; },
@@ -334,55 +404,60 @@ void bind(nb::module_& module) {
              nb::arg("height"), nb::arg("known"), nb::arg("lag_s"),
              "constants: a ModelConstants; width, height: of the picture (px), if known; lag_s: of the smoother (s),\n"
              "infinite for whole tracks, negative for none.")
-        .def("declare_sensor", &Model::declare_sensor,
+        .def("declare_sensor", exclusive(&Model::declare_sensor),
              nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(),
              "Add a sensor that has not looked yet. even_logit: of the score at which a box is as likely real as not,\n"
              "NaN where it is to be learnt.")
-        .def("take", &Model::take, nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
+        .def("take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
              nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("alike").noconvert() = nb::none(),
              nb::arg("motion").noconvert() = nb::none(),
              "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
              "top, right, bottom (px), logits of their scores (M,); alike (N, M): how much more likely each box is of a\n"
              "living track than of another by what both look like, as ln of the ratio; motion (11,): of the camera since\n"
              "its picture before, see jeat_graph.filters.picture_motion.PictureMotion.")
-        .def("record", &Model::record, "What the last step gave the smoother; once.")
-        .def("hand_over", &Model::hand_over, nb::arg("record").none() = nb::none(),
+        .def("record", exclusive(&Model::record), "What the last step gave the smoother; once.")
+        .def("hand_over", exclusive(&Model::hand_over), nb::arg("record").none() = nb::none(),
              nb::arg("given").noconvert() = nb::none(), nb::arg("label").noconvert() = nb::none(),
              nb::arg("share").noconvert() = nb::none(),
              "Tell the smoother of a step (of the last one without a record), in order of time: the identity given out\n"
              "for each of its tracks (N,), the number of its class, below 0 for none, and the share of its votes.")
-        .def("begin_anew", &Model::begin_anew, nb::arg("t"),
+        .def("begin_anew", exclusive(&Model::begin_anew), nb::arg("t"),
              "End all tracks and go on from another time (s), as if none had passed; what was learnt stays.")
-        .def("snapshot", &Model::snapshot, "A copy of all that the next step depends on.")
-        .def("restore", &Model::restore, nb::arg("moment"), "Go back to a snapshot of this model.")
-        .def("number_on_from", &Model::number_on_from, nb::arg("identity"), "Give no new track a smaller identity.")
-        .def("state", &Model::state, nb::arg("moment").none() = nb::none(),
+        .def("snapshot", exclusive(&Model::snapshot), "A copy of all that the next step depends on.")
+        .def("restore", exclusive(&Model::restore), nb::arg("moment"), "Go back to a snapshot of this model.")
+        .def("number_on_from", exclusive(&Model::number_on_from), nb::arg("identity"), "Give no new track a smaller identity.")
+        .def("state", exclusive(&Model::state), nb::arg("moment").none() = nb::none(),
              "Everything as arrays by name, the smoother's too; that at a moment, if one is given.")
-        .def("set_state", &Model::set_state, nb::arg("state"),
+        .def("set_state", exclusive(&Model::set_state), nb::arg("state"),
              "Go on from what state() returned. ValueError: it is not what a model can be in; nothing is changed then.")
-        .def("rows", &Model::rows, "Reported tracks: t, identity, mean (N, 10), variance (N, 10), posterior, sensors, class, its share.")
-        .def("states", &Model::states, "Their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7.")
-        .def("fit", &Model::fit,
+        .def("rows", exclusive(&Model::rows), "Reported tracks: t, identity, mean (N, 10), variance (N, 10), posterior, sensors, class, its share.")
+        .def("states", exclusive(&Model::states), "Their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7.")
+        .def("fit", exclusive(&Model::fit),
              "Of the boxes of the last step the squared distance of the centre (M,), NaN where it began a track, and\n"
              "the scale of the sensor's noise (M,); the posteriors (N,) of the tracks in living().")
-        .def("identities", &Model::identities, "Identities of the living tracks (N,).")
-        .def("sensors", &Model::sensors, "Number of sensors.")
-        .def("time", &Model::time, "Time of the last step (s); None before the first.")
-        .def("picture", &Model::picture, "Width and height of the picture (px), as far as is known.")
-        .def("last_looks", &Model::last_looks, "When each sensor looked last (s), NaN for never.")
-        .def("waiting", &Model::waiting, "Number of smoothed rows that have become final.")
-        .def("takers", &Model::takers, "Identity of the track that took each box of the last step (M,).")
-        .def("living", &Model::living, "Identities of the tracks of the last step, before any ended (N,).")
-        .def("size", &Model::size, "Number of living tracks.")
-        .def("born", &Model::born, "Number of tracks started so far.")
-        .def("boxes_end_at_edge", &Model::boxes_end_at_edge,
+        .def("identities", exclusive(&Model::identities), "Identities of the living tracks (N,).")
+        .def("sensors", exclusive(&Model::sensors), "Number of sensors.")
+        .def("time", exclusive(&Model::time), "Time of the last step (s); None before the first.")
+        .def("picture", exclusive(&Model::picture), "Width and height of the picture (px), as far as is known.")
+        .def("last_looks", exclusive(&Model::last_looks), "When each sensor looked last (s), NaN for never.")
+        .def("__deepcopy__", [](Model& model, const nb::object&) {
+                 const Exclusive::Hold hold(model.use);
+                 return new Model(model);
+             },
+             nb::arg("memo"), "A model of its own in the same state.")
+        .def("waiting", exclusive(&Model::waiting), "Number of smoothed rows that have become final.")
+        .def("takers", exclusive(&Model::takers), "Identity of the track that took each box of the last step (M,).")
+        .def("living", exclusive(&Model::living), "Identities of the tracks of the last step, before any ended (N,).")
+        .def("size", exclusive(&Model::size), "Number of living tracks.")
+        .def("born", exclusive(&Model::born), "Number of tracks started so far.")
+        .def("boxes_end_at_edge", exclusive(&Model::boxes_end_at_edge),
              "Whether boxes end at the edge of the picture more often than they reach beyond it.")
-        .def("smoothed", &Model::smoothed, "Smoothed rows so far, columns as those of rows.")
-        .def("drain", &Model::drain, "Smoothed rows that have become final; they are forgotten.")
-        .def("finish", &Model::finish, "The same, all tracks being ended.")
-        .def("gaps", &Model::gaps, "Gaps that outlasted each bin, and those that ended well (2, 9).")
-        .def("learnt", &Model::learnt, "What is believed of the sensors and the scene, by name.")
-        .def("tracks", &Model::tracks, "Columns of the living tracks, by name.");
+        .def("smoothed", exclusive(&Model::smoothed), "Smoothed rows so far, columns as those of rows.")
+        .def("drain", exclusive(&Model::drain), "Smoothed rows that have become final; they are forgotten.")
+        .def("finish", exclusive(&Model::finish), "The same, all tracks being ended.")
+        .def("gaps", exclusive(&Model::gaps), "Gaps that outlasted each bin, and those that ended well (2, 9).")
+        .def("learnt", exclusive(&Model::learnt), "What is believed of the sensors and the scene, by name.")
+        .def("tracks", exclusive(&Model::tracks), "Columns of the living tracks, by name.");
 }
 
 }  // namespace jeat::tracking

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <string>
+#include <string_view>
 #include <type_traits>
 
 #include <nanobind/nanobind.h>
@@ -135,7 +136,8 @@ private:
 template <class Visitor, class Table>
 void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_t rows) {
     table.columns([&](const char* name, auto& column, std::size_t width) {
-        v.column(prefix + name, column, rows, width);
+        // Of times is known elsewhere what they may be; they are never multiplied.
+        v.column(prefix + name, column, rows, width, std::string_view(name).ends_with("_s") ? Values::any : Values::finite);
     });
 }
 
@@ -220,7 +222,7 @@ template <class Visitor> void visit_rows(Visitor& v, const std::string& prefix, 
     auto& [t, mean, variance, real, share, track_id, used, label] = table;
     std::size_t rows = track_id.size();
     v.whole(prefix + "rows", rows);
-    v.column(prefix + "t", t, rows, 1);
+    v.column(prefix + "t", t, rows, 1, Values::any);
     v.column(prefix + "track_id", track_id, rows, 1);
     v.column(prefix + "mean", mean, rows, 2 * kMotion);
     v.column(prefix + "variance", variance, rows, 2 * kMotion);
@@ -302,7 +304,7 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     v.column("histories.counts", counts, tracks, 1);
     v.column("histories.share", share, tracks, 1, Values::any);
     v.column("histories.given_missed", given_missed, tracks, 1);
-    v.column("histories.t", columns.t, total, 1);
+    v.column("histories.t", columns.t, total, 1, Values::any);
     v.column("histories.dt", columns.dt, total, 1);
     v.column("histories.real", columns.real, total, 1);
     v.column("histories.used", columns.used, total, 1);
@@ -329,84 +331,6 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
         }
         StateReader::require(at == total, "histories.counts", "do not add up");
     }
-}
-
-// Whether a covariance can be one: variances above 0, no correlation beyond 1, but for rounding.
-inline bool is_covariance(const double* P) {
-    constexpr double kRounding = 1e-6;
-    for (int i = 0; i < kStates; ++i) {
-        if (!(P[i * kStates + i] > 0.0)) return false;
-        for (int j = 0; j < i; ++j) {
-            const double a = P[i * kStates + j], b = P[j * kStates + i];
-            const double most = std::sqrt(P[i * kStates + i]) * std::sqrt(P[j * kStates + j]);
-            if (!(std::abs(a) <= most * (1.0 + kRounding)) || !(std::abs(a - b) <= most * kRounding)) return false;
-        }
-    }
-    return true;
-}
-
-inline void check_motion(const std::string& name, const std::vector<double>& mean,
-                         const std::vector<double>& covariance) {
-    for (std::size_t k = 0; k < mean.size(); ++k) {
-        const std::size_t place = k % kStates;
-        if (place == kLogSize || place == kGrowth)
-            StateReader::require(std::abs(mean[k]) <= kMostLogSize, name, "holds what is no size");
-    }
-    for (std::size_t k = 0; k < covariance.size(); k += kMatrix)
-        StateReader::require(is_covariance(&covariance[k]), name, "holds what is no covariance");
-}
-
-inline void check_identities(const std::string& name, const std::vector<std::int64_t>& ids, std::int64_t next_id) {
-    std::int64_t before = 0;
-    for (const std::int64_t id : ids) {
-        StateReader::require(id > before && id < next_id, name, "are not those that were given out");
-        before = id;
-    }
-}
-
-inline void check_state(const State& state, const Answer& answer) {
-    const std::size_t S = state.sensors.size();
-    StateReader::require(!state.started || std::isfinite(state.t), "t", "is no time");
-    StateReader::require(state.width > 0.0 && state.height > 0.0, "width and height", "are none");
-    check_identities("tracks.track_id", state.tracks.track_id, state.next_id);
-    check_identities("answer.living", answer.living, state.next_id);
-    check_motion("tracks", state.tracks.mean, state.tracks.covariance);
-    check_motion("answer", answer.mean, answer.covariance);
-    for (const Evidence* one : {&state.tracks.evidence, &state.ended})
-        for (const std::int64_t owner : one->owner)
-            StateReader::require(owner >= 0 && static_cast<std::size_t>(owner) < S, "owner", "is no sensor");
-    for (const Evidence* one : {&state.tracks.evidence, &state.ended})
-        for (std::size_t k = 0; k < one->hits.size(); ++k)
-            StateReader::require(one->stationary_hits[k] <= one->hits[k] && one->stationary_misses[k] <= one->misses[k],
-                                 "stationary hits and misses", "are more than all");
-    const auto shares = [](const char* name, const std::vector<double>& values) {
-        for (const double p : values) StateReader::require(p >= 0.0 && p <= 1.0, name, "holds what is no probability");
-    };
-    shares("tracks.real", state.tracks.real);
-    shares("tracks.presence", state.tracks.presence);
-    shares("belief.p_detect", state.belief.p_detect);
-    shares("belief.unseen", state.belief.unseen);
-    shares("belief.stationary_unseen", state.belief.stationary_unseen);
-    shares("belief.agreed_share", state.belief.agreed_share);
-    for (const double std : state.belief.agreed_std) StateReader::require(std > 0.0, "belief.agreed_std", "is none");
-}
-
-inline void check_histories(Histories& histories, const State& state, bool smooths) {
-    const std::vector<History>& living = histories.living();
-    // There are none where the tracker has been finished.
-    bool fits = living.empty() || (smooths && living.size() == state.tracks.size());
-    for (std::size_t i = 0; fits && i < living.size(); ++i) fits = living[i].track_id == state.tracks.track_id[i];
-    StateReader::require(fits, "histories.track_id", "are not those of the tracks");
-    std::array<double, kCovariance> before, after;
-    for (const History& history : living)
-        for (const Entry& entry : history.entries) {
-            smoothers::unfold(entry.predicted_covariance, before.data());
-            smoothers::unfold(entry.covariance, after.data());
-            for (int axis = 0; axis < 2; ++axis)
-                StateReader::require(is_covariance(&before[axis * kMatrix]) && is_covariance(&after[axis * kMatrix]) &&
-                                         std::abs(entry.mean[axis * kStates + kLogSize]) <= kMostLogSize,
-                                     "histories", "hold what is no state");
-        }
 }
 
 }  // namespace jeat::tracking

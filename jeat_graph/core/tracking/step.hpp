@@ -287,6 +287,7 @@ private:
         weigh_boxes(scan, index);
         pairs_.clear();
         for (std::size_t i = 0; i < n; ++i) {
+            may_be_interrupted();
             p_detect_[i] = own_p_detect(i, k);
             expected_[i] = expected_sides(tracks.mean_of(i), tracks.covariance_of(i), rho2, c_);
             const SidesExpected& expected = expected_[i];
@@ -308,13 +309,14 @@ private:
                 if (gain > 0.0) pairs_.push_back({i, j, gain});
             });
         }
-        made_ = assignment_.solve(by_looks(scan), n, boxes_.size());
+        made_ = assignment_.solve(by_looks(scan), n, boxes_.size(), c_.exact_assignment);
     }
 
     // Which boxes tell that their track is still there, by score and overlap with a better box of the scan.
     void weigh_boxes(const Scan& scan, const ByLeft& index) {
         confirms_.resize(boxes_.size());
         for (std::size_t j = 0; j < boxes_.size(); ++j) {
+            may_be_interrupted();
             double overlap = 0.0;
             index.near(boxes_[j], [&](std::size_t other) {
                 if (scan.logits[other] > scan.logits[j])
@@ -436,6 +438,7 @@ private:
         const double rho2 = exp_of(s_.log_side_variance[k]);
         for (std::size_t f = 0; f < free_.size(); ++f) {
             const std::size_t row = n + f, j = free_[f];
+            may_be_interrupted();
             double overlap = 0.0;
             rivals.near(boxes_[j], [&](std::size_t r) {
                 overlap = std::max(overlap, intersection_over_union(boxes_[j], rivals_[r]));
@@ -492,6 +495,7 @@ private:
         const ByLeft index(tracks_boxes_);
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             if (!(unseen_for(i) < kSameTimeS) || tracks.evidence.overlap[i] == 0.0) continue;
+            may_be_interrupted();
             double most = 0.0;
             index.near(tracks_boxes_[i], [&](std::size_t j) {
                 if (tracks.log_odds[j] > tracks.log_odds[i] && tracks.evidence.detections[j] >= tracks.evidence.detections[i])
@@ -506,6 +510,7 @@ private:
         PosteriorRule rule(s_.belief, c_);
         const std::size_t S = s_.sensors.size();
         for (std::size_t i = 0; i < tracks.size(); ++i) {
+            may_be_interrupted();
             const Posterior& belief = rule(tracks.evidence, i);
             tracks.log_odds[i] = belief.log_odds;
             const bool stationary = is_stationary(i);

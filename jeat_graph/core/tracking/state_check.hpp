@@ -1,0 +1,257 @@
+// What every state that is read back must be: whatever a step, or the smoother, relies on. Throws std::invalid_argument,
+// which is ValueError in Python.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "tracking/saved.hpp"
+
+namespace jeat::tracking {
+
+// ln of a variance, or of a density, that no scene has comes from no learning.
+inline constexpr double kMostLogVariance = 100.0;
+// Sums of so many scans come from no recording.
+inline constexpr double kMostCount = 1e15;
+// Of shares and sums that are computed, by which they may miss what they are exactly.
+inline constexpr double kShareRounding = 1e-9;
+inline constexpr std::int64_t kMostIdentities = std::int64_t{1} << 62;
+
+inline void require(bool holds, const std::string& name, const char* what) { StateReader::require(holds, name, what); }
+
+// Whether a covariance can be one: of the correlations, with a rounding's worth on the diagonal, a Cholesky factor exists.
+inline bool is_covariance(const double* P) {
+    constexpr double kRounding = 1e-6;
+    std::array<double, kStates> std{};
+    for (int i = 0; i < kStates; ++i) {
+        if (!(P[i * kStates + i] > 0.0)) return false;
+        std[i] = std::sqrt(P[i * kStates + i]);
+    }
+    Matrix L{};
+    for (int i = 0; i < kStates; ++i)
+        for (int j = 0; j <= i; ++j) {
+            const double a = P[i * kStates + j] / std[i] / std[j], b = P[j * kStates + i] / std[i] / std[j];
+            if (!(std::abs(a) <= 1.0 + kRounding) || !(std::abs(a - b) <= kRounding)) return false;
+            double rest = a;
+            for (int k = 0; k < j; ++k) rest -= L[i * kStates + k] * L[j * kStates + k];
+            if (i == j) {
+                rest += kRounding;
+                if (!(rest > 0.0)) return false;
+                L[i * kStates + i] = std::sqrt(rest);
+            } else {
+                L[i * kStates + j] = rest / L[j * kStates + j];
+            }
+        }
+    return true;
+}
+
+inline void check_motion(const std::string& name, const std::vector<double>& mean,
+                         const std::vector<double>& covariance) {
+    for (std::size_t k = 0; k < mean.size(); ++k) {
+        const std::size_t place = k % kStates;
+        if (place == kLogSize || place == kGrowth || place == kSizeError)
+            require(std::abs(mean[k]) <= kMostLogSize, name, "holds what is no size");
+    }
+    for (std::size_t k = 0; k < covariance.size(); k += kMatrix)
+        require(is_covariance(&covariance[k]), name, "holds what is no covariance");
+}
+
+inline void check_identities(const std::string& name, const std::vector<std::int64_t>& ids, std::int64_t next_id) {
+    std::int64_t before = 0;
+    for (const std::int64_t id : ids) {
+        require(id > before && id < next_id, name, "are not those that were given out");
+        before = id;
+    }
+}
+
+template <class Values> void check_between(const std::string& name, const Values& values, double low, double high) {
+    for (const double value : values) require(value >= low && value <= high, name, "holds what is out of its range");
+}
+inline void check_between(const std::string& name, double value, double low, double high) {
+    check_between(name, std::array{value}, low, high);
+}
+template <class Values> void check_counts(const std::string& name, const Values& values) {
+    check_between(name, values, 0.0, kMostCount);
+}
+inline void check_flags(const std::string& name, const std::vector<std::uint8_t>& flags) {
+    for (const std::uint8_t flag : flags) require(flag <= 1, name, "is neither true nor false");
+}
+// Of probabilities whose logarithm is taken, and that of what they leave.
+template <class Values> void check_unsure(const std::string& name, const Values& values) {
+    for (const double p : values) require(p > 0.0 && p < 1.0, name, "holds what is no probability");
+}
+inline void check_sensors(const std::string& name, const std::vector<std::int64_t>& used, std::size_t sensors) {
+    for (const std::int64_t bits : used)
+        require(bits >= 0 && (bits >> sensors) == 0, name, "are sensors that are not there");
+}
+// A time that has been, or none.
+inline void check_past(const std::string& name, double time, double now) {
+    require(!(time > now) && time < std::numeric_limits<double>::infinity(), name, "is no time that has been");
+}
+
+inline void check_evidence(const std::string& name, const Evidence& e, double now) {
+    for (const std::int64_t owner : e.owner)
+        require(owner >= 0 && static_cast<std::size_t>(owner) < e.sensors, name + "owner", "is no sensor");
+    for (const auto* column : {&e.hits, &e.misses, &e.stationary_hits, &e.stationary_misses, &e.recent_weight, &e.total_weight})
+        check_counts(name + "counts", *column);
+    for (std::size_t k = 0; k < e.hits.size(); ++k) {
+        const double rounding = kShareRounding * (e.hits[k] + e.misses[k]);
+        require(e.stationary_hits[k] <= e.hits[k] + rounding && e.stationary_misses[k] <= e.misses[k] + rounding, name,
+                "has more stationary hits and misses than all");
+    }
+    check_flags(name + "found", e.found);
+    for (const auto* column : {&e.recent, &e.peak, &e.total, &e.gained})
+        check_between(name + "sums", *column, -kMostCount, kMostCount);
+    check_between(name + "overlap", e.overlap, 0.0, 1.0 + kShareRounding);
+    check_between(name + "detections", e.detections, 1.0, kMostCount);
+    for (std::size_t k = 0; k < e.size(); ++k) {
+        check_past(name + "last_s", e.last_s[k], now);
+        require(e.born_s[k] <= e.last_s[k] && e.confirmed_s[k] <= e.last_s[k], name, "was seen before it began");
+    }
+}
+
+inline void check_tracks(const Tracks& tracks, const State& state) {
+    check_identities("tracks.track_id", tracks.track_id, state.next_id);
+    check_motion("tracks", tracks.mean, tracks.covariance);
+    check_sensors("tracks.used", tracks.used, state.sensors.size());
+    check_between("tracks.presence", tracks.presence, 0.0, 1.0 + kShareRounding);
+    for (std::size_t k = 0; k < tracks.presence.size(); k += kPresences) {
+        const double sum = tracks.presence[k] + tracks.presence[k + 1] + tracks.presence[k + 2];
+        require(std::abs(sum - 1.0) <= 1e-6, "tracks.presence", "does not add up to 1");
+    }
+    check_counts("tracks.recent_hits", tracks.recent_hits);
+    check_counts("tracks.recent_misses", tracks.recent_misses);
+    for (const double time : tracks.last_box_s) check_past("tracks.last_box_s", time, state.t);
+    for (const Sides& box : tracks.last_box)
+        require(box.right >= box.left && box.bottom >= box.top, "tracks.last_box", "is inside out");
+    check_flags("tracks.has_innovation", tracks.has_innovation);
+    check_between("tracks.innovation", tracks.innovation, -kMostLogVariance, kMostLogVariance);
+    check_between("tracks.real", tracks.real, 0.0, 1.0);
+    check_between("tracks.sees", tracks.sees, 0.0, 1.0 + kShareRounding);
+    check_evidence("tracks.", tracks.evidence, state.t);
+}
+
+inline void check_sensor(const std::string& name, const Sensor& sensor, double now) {
+    for (const double count : {sensor.leftovers, sensor.false_boxes, sensor.boxes_at_edge, sensor.boxes_beyond})
+        check_between(name + "counts", count, 0.0, kMostCount);
+    require(!(sensor.period_s < 0.0) && !std::isinf(sensor.period_s), name + "period_s", "is no time");
+    require(!std::isinf(sensor.last_look_s), name + "last_look_s", "is no time");
+    check_past(name + "last_look_s", sensor.last_look_s, now);
+    require(!(std::abs(sensor.even_logit) > kMostLogVariance), name + "even_logit", "is of no score");
+    const RepeatCounts& counts = sensor.repetition;
+    for (int bin = 0; bin < kScoreBins; ++bin) {
+        const double boxes = counts.boxes[static_cast<std::size_t>(bin)], repeated = counts.repeated[static_cast<std::size_t>(bin)];
+        check_between(name + "boxes", boxes, 0.0, kMostCount);
+        check_between(name + "repeated", repeated, 0.0, boxes * (1.0 + kShareRounding));
+    }
+    require(counts.scans <= kMostIdentities, name + "scans", "are too many");
+    check_between(name + "last_logits", counts.last_logits, -kMostLogVariance, kMostLogVariance);
+    for (const Sides& box : counts.last_boxes)
+        require(box.right >= box.left && box.bottom >= box.top, name + "last_boxes", "is inside out");
+    check_flags(name + "last_had_before", counts.last_had_before);
+}
+
+inline void check_belief(const State& state) {
+    const SensorBelief& belief = state.belief;
+    check_unsure("belief.p_detect", belief.p_detect);
+    check_unsure("belief.unseen", belief.unseen);
+    check_unsure("belief.stationary_unseen", belief.stationary_unseen);
+    check_unsure("belief.noise_share", std::array{belief.noise_share});
+    check_between("belief.agreed_mean", belief.agreed_mean, -kMostLogVariance, kMostLogVariance);
+    check_between("belief.agreed_share", belief.agreed_share, 0.0, 1.0);
+    check_between("belief.agreed_std", belief.agreed_std, 0.0, kMostLogVariance);
+    for (const double std : belief.agreed_std) require(std > 0.0, "belief.agreed_std", "is none");
+    check_between("belief.indifference", belief.indifference, -kMostLogVariance, kMostLogVariance);
+    check_between("belief.prior_odds", belief.prior_odds, -kMostLogVariance, kMostLogVariance);
+    check_between("log_side_variance", state.log_side_variance, -kMostLogVariance, kMostLogVariance);
+    const ProcessNoise& q = state.process_noise;
+    check_between("process_noise", std::array{q.jerk, q.growth, q.position, q.size}, -kMostLogVariance, kMostLogVariance);
+    for (const double variance : {state.camera.shift, state.camera.scale})
+        require(variance > 0.0, "camera", "has no variance");
+    check_counts("gaps.ended", state.gaps.ended);
+    for (std::size_t k = 0; k < state.gaps.ended.size(); ++k)
+        check_between("gaps.ended_well", state.gaps.ended_well[k], 0.0, state.gaps.ended[k]);
+    const OffsetSums& offsets = state.offsets;
+    check_counts("offsets.weight", offsets.weight);
+    for (std::size_t i = 0; i < offsets.sensors; ++i)
+        for (std::size_t j = 0; j < offsets.sensors; ++j) {
+            const std::size_t at = i * offsets.sensors + j, back = j * offsets.sensors + i;
+            require(offsets.weight[at] == offsets.weight[back], "offsets.weight", "is not the same both ways");
+            for (std::size_t k = 0; k < 4; ++k)
+                require(offsets.total[4 * at + k] == -offsets.total[4 * back + k] &&
+                            std::abs(offsets.total[4 * at + k]) <= kMostLogSize * (offsets.weight[at] + 1.0),
+                        "offsets.total", "is of no boxes");
+        }
+}
+
+inline void check_state(const State& state, const Answer& answer) {
+    require(std::isfinite(state.t), "t", "is no time");
+    require(state.width > 0.0 && state.height > 0.0, "width and height", "are none");
+    require(state.next_id >= 1 && state.next_id <= kMostIdentities, "next_id", "is no identity");
+    check_past("learnt_s", state.learnt_s, state.t);
+    check_past("camera.picture_s", state.camera_velocity.picture_s, state.t);
+    require(state.camera_velocity.until_s >= state.camera_velocity.picture_s &&
+                state.camera_velocity.until_s < std::numeric_limits<double>::infinity(),
+            "camera.until_s", "is no time");
+    require(state.started || state.tracks.size() == 0, "tracks", "are there before the first step");
+    check_tracks(state.tracks, state);
+    check_evidence("ended.", state.ended, std::numeric_limits<double>::max());
+    for (std::size_t k = 0; k < state.sensors.size(); ++k)
+        check_sensor("sensor" + std::to_string(k) + ".", state.sensors[k], state.t);
+    check_belief(state);
+    check_identities("answer.living", answer.living, state.next_id);
+    check_motion("answer", answer.mean, answer.covariance);
+    check_between("answer.real", answer.real, 0.0, 1.0);
+    for (const std::int64_t taker : answer.takers)
+        require(taker >= 0 && taker < state.next_id, "answer.takers", "are no tracks");
+}
+
+inline void check_rows(const std::string& name, const Rows& rows, const State& state) {
+    check_sensors(name, rows.used, state.sensors.size());
+    check_between(name, rows.real, 0.0, 1.0);
+    for (const std::int64_t id : rows.track_id) require(id > 0 && id <= kMostIdentities, name, "are of no tracks");
+    for (const double share : rows.share) require(!(share < 0.0) && !(share > 1.0), name, "hold no shares");
+    for (const double t : rows.t) require(std::isfinite(t), name, "are of no time");
+}
+
+inline void check_entries(const History& history, const State& state) {
+    const std::string name = "histories";
+    double before = -std::numeric_limits<double>::infinity();
+    require(history.missed >= -1.0 && history.missed <= kMostCount, name, "have missed less than nothing");
+    for (const Entry& entry : history.entries) {
+        require(entry.t >= before && entry.t <= state.t && entry.dt >= 0.0, name, "are in no order of time");
+        require(entry.missed >= 0.0 && entry.missed <= kMostCount, name, "have missed less than nothing");
+        require(entry.real >= 0.0 && entry.real <= 1.0, name, "hold what is no probability");
+        check_sensors(name, {entry.used}, state.sensors.size());
+        before = entry.t;
+        for (const auto* mean : {&entry.mean, &entry.predicted_mean})
+            for (int axis = 0; axis < 2; ++axis)
+                for (const int place : {kLogSize, kGrowth, kSizeError})
+                    require(std::abs((*mean)[static_cast<std::size_t>(axis * kStates + place)]) <= kMostLogSize, name,
+                            "hold what is no size");
+        std::array<double, kCovariance> whole;
+        for (const auto* halves : {&entry.predicted_covariance, &entry.covariance}) {
+            smoothers::unfold(*halves, whole.data());
+            require(is_covariance(whole.data()) && is_covariance(&whole[kMatrix]), name, "hold what is no covariance");
+        }
+    }
+}
+
+inline void check_histories(Histories& histories, const State& state, bool smooths) {
+    const std::vector<History>& living = histories.living();
+    // There are none where the tracker has been finished.
+    bool fits = living.empty() || (smooths && living.size() == state.tracks.size());
+    for (std::size_t i = 0; fits && i < living.size(); ++i) fits = living[i].track_id == state.tracks.track_id[i];
+    require(fits, "histories.track_id", "are not those of the tracks");
+    for (const History& history : living) {
+        require(history.called.track_id > 0 && history.called.track_id <= kMostIdentities, "histories.given", "are none");
+        require(!(history.called.share < 0.0) && !(history.called.share > 1.0), "histories.share", "are none");
+        check_entries(history, state);
+    }
+    check_rows("final", histories.rows(), state);
+}
+
+}  // namespace jeat::tracking
