@@ -187,6 +187,7 @@ FORGED = {
     "tracks.total_weight": [-1.0],
     "tracks.detections": [0.0, -1.0],
     "tracks.overlap": [-0.1, 2.0],
+    "tracks.missed": [-1.0, np.nan],
     "tracks.found": [2],
     "tracks.owner": [-1, 99],
     "tracks.last_s": [np.nan, np.inf, 1e6],

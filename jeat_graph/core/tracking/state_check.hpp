@@ -95,7 +95,7 @@ inline void check_past(const std::string& name, double time, double now) {
 inline void check_evidence(const std::string& name, const Evidence& e, double now) {
     for (const std::int64_t owner : e.owner)
         require(owner >= 0 && static_cast<std::size_t>(owner) < e.sensors, name + "owner", "is no sensor");
-    for (const auto* column : {&e.hits, &e.misses, &e.stationary_hits, &e.stationary_misses, &e.recent_weight, &e.total_weight})
+    for (const auto* column : {&e.hits, &e.misses, &e.stationary_hits, &e.stationary_misses, &e.recent_weight, &e.total_weight, &e.missed})
         check_counts(name + "counts", *column);
     for (std::size_t k = 0; k < e.hits.size(); ++k) {
         const double rounding = kShareRounding * (e.hits[k] + e.misses[k]);
