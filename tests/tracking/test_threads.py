@@ -121,16 +121,16 @@ def state_bytes(model):
 
 @pytest.fixture
 def alarm():
-    """Have a function called in this thread, as a signal's handler, after some seconds."""
-    before = signal.getsignal(signal.SIGALRM)
+    """Have a function called in this thread, as a signal's handler, after some seconds of its own."""
+    before = signal.getsignal(signal.SIGVTALRM)
 
     def ring(handler, after_s):
-        signal.signal(signal.SIGALRM, lambda *_: handler())
-        signal.setitimer(signal.ITIMER_REAL, after_s)
+        signal.signal(signal.SIGVTALRM, lambda *_: handler())
+        signal.setitimer(signal.ITIMER_VIRTUAL, after_s)
 
     yield ring
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    signal.signal(signal.SIGALRM, before)
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+    signal.signal(signal.SIGVTALRM, before)
 
 
 def test_a_signal_ends_a_long_step_which_has_not_been_then(model, alarm):
