@@ -30,8 +30,8 @@ from jeat_graph.live.waiting import Released, WaitingRoom, by_time
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.tracking.checkpoint import load_state, save_state
 from jeat_graph.tracking.damage import refusing_damage
-from jeat_graph.tracking.model_tracker import PendingStep
 from jeat_graph.tracking.one_at_a_time import OneAtATime, one_at_a_time
+from jeat_graph.tracking.pending_step import PendingStep
 from jeat_graph.tracking.prediction import Prediction
 from jeat_graph.tracking.scans import ScanLike, as_scans
 from jeat_graph.tracking.tracker import Tracker

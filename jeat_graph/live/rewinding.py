@@ -14,7 +14,7 @@ from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.live.identities import Identities
 from jeat_graph.tracking.model_saving import ModelSnapshot
-from jeat_graph.tracking.model_tracker import PendingStep
+from jeat_graph.tracking.pending_step import PendingStep
 from jeat_graph.tracking.tracker import Tracker
 
 

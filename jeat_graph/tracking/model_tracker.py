@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import ModelRows, in_order
 from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names, number_classes
-from jeat_graph.tracking.engine import Recorded, StepBoxes, StepInput, TrackEngine
+from jeat_graph.tracking.engine import StepBoxes, StepInput, TrackEngine
 from jeat_graph.tracking.engines import make_engine
 from jeat_graph.tracking.first_sight import wider
 from jeat_graph.tracking.heaps import Heaps
@@ -35,6 +34,7 @@ from jeat_graph.tracking.model_measured import diagnostics_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
 from jeat_graph.tracking.model_tables import ClassNames, Places, table_of, with_classes
 from jeat_graph.tracking.one_at_a_time import OneAtATime, one_at_a_time
+from jeat_graph.tracking.pending_step import PendingStep
 from jeat_graph.tracking.prediction import Prediction, of_motion, still_there, time_from
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
@@ -47,26 +47,6 @@ _MOST_SENSORS = 63
 _MOST_ALIKE = 4.0
 _NO_BOXES: IntArray = np.zeros(0, dtype=np.int64)
 _FINISHED = "this tracker has been finished; make another one for another recording"
-
-
-class PendingStep(NamedTuple):
-    """A step that the smoothers are to be told of when nothing can come before it any more.
-
-    Attributes:
-        record: the engine's, of N tracks.
-        t: its time (s).
-        ids: (N,) their identities.
-        label: (N,) numbers of their classes, or None.
-        share: (N,) of the votes that speak for these, or None.
-        given: (N,) identities that the tables are to have in their place, or None.
-    """
-
-    record: Recorded
-    t: float
-    ids: IntArray
-    label: IntArray | None = None
-    share: FloatArray | None = None
-    given: IntArray | None = None
 
 
 def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
