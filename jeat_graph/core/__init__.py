@@ -12,7 +12,7 @@ from pathlib import Path
 from jeat_graph.data.errors import CoreMissingError
 
 try:
-    from jeat_graph.core._core import detection, events, io, road, tracking
+    from jeat_graph.core._core import association, detection, events, io, road, tracking
 except ModuleNotFoundError:
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     raise CoreMissingError(
@@ -21,4 +21,4 @@ except ModuleNotFoundError:
         "jeat-graph is installed, run Python in another folder: in a checkout it takes the sources there"
     ) from None
 
-__all__ = ["detection", "events", "io", "road", "tracking"]
+__all__ = ["association", "detection", "events", "io", "road", "tracking"]

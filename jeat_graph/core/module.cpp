@@ -3,6 +3,9 @@
 
 namespace nb = nanobind;
 
+namespace jeat::association {
+void bind(nb::module_& module);
+}
 namespace jeat::detection {
 void bind(nb::module_& module);
 }
@@ -21,6 +24,8 @@ void bind(nb::module_& module);
 
 NB_MODULE(_core, module) {
     module.doc() = "The compiled part of jeat-graph; its submodules have the names of the package's folders.";
+    auto association = module.def_submodule("association", "Kernels of jeat_graph.association.");
+    jeat::association::bind(association);
     auto detection = module.def_submodule("detection", "Kernels of jeat_graph.detection.");
     jeat::detection::bind(detection);
     auto events = module.def_submodule("events", "Decoders and encoders of jeat_graph.io.events.");
