@@ -62,7 +62,7 @@ class LearntScene(NamedTuple):
     picture: tuple[float, float]
 
 
-class Measured(NamedTuple):
+class MeasuredBoxes(NamedTuple):
     """Detections in order of time.
 
     Attributes:
@@ -115,7 +115,7 @@ class _Steps(NamedTuple):
     mean: list[FloatArray]
 
 
-def ends_of(seen: Measured, hits: IntArray, scene: LearntScene, c: ModelConstants) -> PieceEnds:
+def ends_of(seen: MeasuredBoxes, hits: IntArray, scene: LearntScene, c: ModelConstants) -> PieceEnds:
     """Filter each piece up to its last detection.
 
     Args:
@@ -128,7 +128,9 @@ def ends_of(seen: Measured, hits: IntArray, scene: LearntScene, c: ModelConstant
     return PieceEnds(seen.t[hits[:, -1]], mean, covariance)
 
 
-def beginnings_of(seen: Measured, hits: IntArray, scene: LearntScene, c: ModelConstants) -> PieceBeginnings:
+def beginnings_of(
+    seen: MeasuredBoxes, hits: IntArray, scene: LearntScene, c: ModelConstants
+) -> PieceBeginnings:
     """Gather what each piece says of its state at its first detection.
 
     Args:
@@ -210,7 +212,7 @@ def log_birth(begun: PieceBeginnings, scene: LearntScene, c: ModelConstants) -> 
 
 
 def _filter(
-    seen: Measured, hits: IntArray, scene: LearntScene, c: ModelConstants
+    seen: MeasuredBoxes, hits: IntArray, scene: LearntScene, c: ModelConstants
 ) -> tuple[FloatArray, FloatArray, _Steps]:
     """Filter pieces over their detections (P, K), -1 where there is none; states behind the last ones."""
     count = len(hits)
@@ -238,7 +240,7 @@ def _filter(
 
 
 def _update(
-    m: FloatArray, P: FloatArray, seen: Measured, hit: IntArray, scene: LearntScene, c: ModelConstants
+    m: FloatArray, P: FloatArray, seen: MeasuredBoxes, hit: IntArray, scene: LearntScene, c: ModelConstants
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return states and covariances after an update by detections, and the noise R (N, 2, 2, 2) it took."""
     expected = np.exp(np.clip(m[..., LOG_SIZE] + m[..., SIZE_ERROR], *_LOG_SIZE_BOUNDS))
@@ -253,19 +255,19 @@ def _update(
     return m + (K @ y[..., None])[..., 0], (P + P.transpose(0, 1, 3, 2)) / 2.0, R
 
 
-def _sizes(seen: Measured, hit: IntArray) -> FloatArray:
+def _sizes(seen: MeasuredBoxes, hit: IntArray) -> FloatArray:
     """Return width and height (N, 2) of detections (px)."""
     return seen.boxes[hit, 2:] - seen.boxes[hit, :2]
 
 
-def _measure(seen: Measured, hit: IntArray) -> FloatArray:
+def _measure(seen: MeasuredBoxes, hit: IntArray) -> FloatArray:
     """Return centre and ln size (N, 2, 2) of detections, by axis."""
     centre = (seen.boxes[hit, :2] + seen.boxes[hit, 2:]) / 2.0
     return np.stack([centre, np.log(_sizes(seen, hit))], axis=-1)
 
 
 def _noise(
-    seen: Measured, hit: IntArray, size: FloatArray, scene: LearntScene, c: ModelConstants
+    seen: MeasuredBoxes, hit: IntArray, size: FloatArray, scene: LearntScene, c: ModelConstants
 ) -> FloatArray:
     """Return the covariance (N, 2, 2, 2) of centre and ln size by axis, of sides that err independently."""
     both = np.sqrt(size.prod(axis=1))[:, None]
@@ -279,7 +281,7 @@ def _noise(
 
 
 def _born(
-    seen: Measured, hit: IntArray, scene: LearntScene, c: ModelConstants
+    seen: MeasuredBoxes, hit: IntArray, scene: LearntScene, c: ModelConstants
 ) -> tuple[FloatArray, FloatArray]:
     """Return states and covariances of pieces that begin at detections."""
     boxes, size = seen.boxes[hit], _sizes(seen, hit)

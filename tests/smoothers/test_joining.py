@@ -8,7 +8,14 @@ import pytest
 from jeat_graph.filters import singer
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers import joining
-from jeat_graph.smoothers.joining import LearntScene, Measured, beginnings_of, ends_of, log_birth, log_ratio
+from jeat_graph.smoothers.joining import (
+    LearntScene,
+    MeasuredBoxes,
+    beginnings_of,
+    ends_of,
+    log_birth,
+    log_ratio,
+)
 
 C = ModelConstants(most_perspective=1e-9)  # linear: the oracle knows no growth
 SCENE = LearntScene(singer.initial_process_noise(C), np.array([-5.0]), -5.0, (640.0, 480.0))
@@ -19,7 +26,7 @@ def detections(t, seed=0):
     centre = np.stack([100.0 + 40.0 * t, 200.0 - 10.0 * t], axis=1) + rng.normal(size=(len(t), 2))
     size = np.exp(np.log([30.0, 40.0]) + 0.02 * rng.normal(size=(len(t), 2)))
     boxes = np.concatenate([centre - size / 2, centre + size / 2], axis=1)
-    return Measured(t, np.zeros(len(t), dtype=int), boxes, np.zeros((len(t), 2, 2), dtype=bool))
+    return MeasuredBoxes(t, np.zeros(len(t), dtype=int), boxes, np.zeros((len(t), 2, 2), dtype=bool))
 
 
 def dense(mean, covariance, z, R, F, Q):
