@@ -80,6 +80,9 @@ def warn(command: str | None, text: object) -> None:
 class _Closed:
     """What stands for a standard stream that was closed before the program began."""
 
+    closed = False  # to whoever asks; it fails when it is used
+    encoding, errors = "utf-8", "backslashreplace"
+
     def __init__(self, name: str) -> None:
         self._name = name
 
