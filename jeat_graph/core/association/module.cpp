@@ -34,7 +34,8 @@ Out<std::int64_t> best_links(In<std::int64_t> tail, In<std::int64_t> head, In<do
             numbers.push_back(k);
         }
         Assignment assignment;
-        for (const std::size_t made : assignment.solve(pairs, nodes, nodes))
+        constexpr double kAnySize = std::numeric_limits<double>::infinity();  // the best cover, however large the group
+        for (const std::size_t made : assignment.solve(pairs, nodes, nodes, kAnySize))
             out[pairs[made].row] = static_cast<std::int64_t>(numbers[made]);
     }
     return handed_over(std::move(out));
