@@ -94,7 +94,7 @@ def join(
         continued, continues = cover >= 0, np.zeros(len(cover), dtype=bool)
         continues[links.head[made]] = True
         new, gone = ~continues & ~first, ~continued & ~last
-        births = (np.bincount(born[new], minlength=2) + 1.0) / steps
+        births = np.asarray((np.bincount(born[new], minlength=2) + 1.0) / steps, dtype=np.float64)
         leaving = np.bincount(left[gone], minlength=2) + 1.0
         exits = leaving / (leaving + np.bincount(left[continued], minlength=2) + 1.0)
         gaps = u[made]

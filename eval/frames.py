@@ -155,7 +155,9 @@ def _as_judged(frames: Frames, all_tracks: Resampled, rules: RulesFor) -> Frames
     for k in range(len(frames.times)):
         g = slice(int(frames.truth_start[k]), int(frames.truth_start[k + 1]))
         m = slice(int(frames.track_start[k]), int(frames.track_start[k + 1]))
-        here = {name: None if column is None else column[g] for name, column in columns.items()}
+        here: dict[str, Any] = {
+            name: None if column is None else column[g] for name, column in columns.items()
+        }
         boxes = all_tracks.boxes[m]
         iou = pairwise_iou(columns["truth"][g], boxes)
         found, counted = rules.protocol.judge(FrameBoxes(iou=iou, tracks=boxes, **here), rules.wanted)

@@ -33,7 +33,8 @@ def motion_in_picture(truth: GroundTruth, title: str) -> GroundTruth:
         return truth
     low = truth.boxes[:, :2] - _BESIDE * truth.boxes[:, 2:]
     high = low + (1.0 + 2.0 * _BESIDE) * truth.boxes[:, 2:]
-    within = float(((place >= low) & (place <= high)).all(axis=1)[known].mean())
+    inside = np.asarray(((place >= low) & (place <= high)).all(axis=1))
+    within = float(inside[known].mean())
     if within >= _LEAST_SHARE:
         return truth
     note(

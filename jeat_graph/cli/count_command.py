@@ -32,6 +32,7 @@ from jeat_graph.eval.passing import LineCrossing
 if TYPE_CHECKING:
     from jeat_graph.data.arrays import FloatArray
     from jeat_graph.data.trajectories import Trajectories
+    from jeat_graph.eval.passing import CountingPlace
     from jeat_graph.eval.stations import StationRecord
 
 WRITES = ("out", "od", "stations", "datex", "crossings")
@@ -115,7 +116,8 @@ def run(args: argparse.Namespace) -> int:
     if args.classes is not None:
         table = table.of_class(*args.classes, final=True)
     known = table.final_classes()
-    possible = [replace(c, t=c.t + later) for p in (*lines, *zones) for c in passages(table, p, known)]
+    marks: list[CountingPlace] = [*lines, *zones]
+    possible = [replace(c, t=c.t + later) for p in marks for c in passages(table, p, known)]
     found = [c for c in possible if c.counted]
     named = {line.name for line in lines}
     at_lines = [replace(c, t=c.t - later) for c in found if c.line in named]

@@ -228,7 +228,7 @@ def declare_sensor(state: ReferenceState, c: ModelConstants, even_logit: float =
     """Add a sensor that has not looked yet, of which what is usual is believed but for what the user says."""
     new, old = object_probability.initial_sensor(c), state.sensors
     columns = (np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True))
-    state.sensors = SensorBelief(*columns, noise_share=old.noise_share)
+    state.sensors = SensorBelief._make([*columns, old.noise_share])
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
     state.offsets = sensor_offsets.widened(state.offsets)
     state.log_side_variance = np.append(state.log_side_variance, 2.0 * math.log(c.side_std))

@@ -71,8 +71,9 @@ def _line(traffic: CountedTraffic, line: str, edges: FloatArray) -> str:
         for way in ways:
             if kinds != [""]:
                 row |= {f"{way} {kind or 'unknown'}": count[way, kind] for kind in kinds}
-            row[f"{way} all"] = sum(count[way, kind] for kind in kinds)
-            curves[way].append(per_hour(int(row[f"{way} all"]), seen))
+            everybody = sum(count[way, kind] for kind in kinds)
+            row[f"{way} all"] = everybody
+            curves[way].append(per_hour(everybody, seen))
         records.append(row)
     total: dict[str, Cell] = {"from": "all", "observed %": None}
     total |= {name: sum(int(row[name] or 0) for row in records) for name in list(records[0])[2:]}

@@ -193,9 +193,19 @@ def _encounter(one: Poses, other: Poses, config: ConflictConfig) -> Encounter | 
         leader = first.at(np.array([t_first])).drawn(_errors()[:, :6])[:, 0]
         headway = _normal(pet + leader[:, LENGTH] / np.maximum(leader[:, SPEED], 0.1))
     return Encounter(
-        *(first.track_id, second.track_id, first.kind, second.kind, kind),
-        *(times, float(place[0]), float(place[1])),
-        *(_quantiles(ttc), _quantiles(drac), _normal(pet), headway, float(hits.mean())),
+        first.track_id,
+        second.track_id,
+        first.kind,
+        second.kind,
+        kind,
+        times,
+        float(place[0]),
+        float(place[1]),
+        _quantiles(ttc),
+        _quantiles(drac),
+        _normal(pet),
+        headway,
+        float(hits.mean()),
     )
 
 
@@ -243,7 +253,7 @@ def _least_ttc(first: Poses, second: Poses) -> tuple[Collision, BoolArray, float
     a, b = first.at(t[around]), second.at(t[around])
     z = _errors()
     states = a.drawn(z[:, :6]), b.drawn(z[:, 6:])
-    drawn, crash = collision(*states), (separation(*states) <= 0.0).any(axis=1)
+    drawn, crash = collision(*states), np.asarray((separation(*states) <= 0.0).any(axis=1), dtype=np.bool_)
     return Collision(drawn.ttc.min(axis=1), drawn.drac.max(axis=1)), crash, float(t[k])
 
 
