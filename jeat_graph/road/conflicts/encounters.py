@@ -28,7 +28,8 @@ _DRAWS = 160
 _AROUND_S = 1.0
 #: The fine grid of post-encroachment times: this wide to either side (s), and this many steps.
 _FINE_S, _FINE = 0.4, 14
-_PERCENT = (2.5, 97.5)
+#: An estimate below or above all draws counts as one below or above all but this share of them.
+_LEAST_SHARE = 0.005
 #: How far beyond its estimate a vehicle may be (standard deviations), to be looked at.
 _BEYOND = 3.0
 
@@ -279,9 +280,17 @@ def _pet(first: Poses, second: Poses, t_first: float, t_second: float) -> FloatA
 
 
 def _quantiles(values: FloatArray) -> Measured:
-    """Estimate (the first draw's) and the interval of the draws (K,)."""
+    """Estimate (the first draw's) and an interval by the draws (K,).
+
+    The least of a noisy course is too small, and that of one drawn around it smaller still: the interval is
+    that of the bias-corrected bootstrap (Efron and Tibshirani, *An Introduction to the Bootstrap*, ch. 14).
+    """
+    from scipy.special import ndtr, ndtri
+
     finite = np.where(np.isfinite(values), values, 1e9)
-    low, high = np.percentile(finite, _PERCENT)
+    below = (float((finite < finite[0]).sum()) + 0.5 * float((finite == finite[0]).sum())) / len(finite)
+    bias = float(ndtri(np.clip(below, _LEAST_SHARE, 1.0 - _LEAST_SHARE)))
+    low, high = np.quantile(finite, ndtr(2.0 * bias + np.array([-Z95, Z95])))
     ends = [math.inf if end > 1e8 else float(end) for end in (low, high)]
     return Measured(float(values[0]), *ends)
 
