@@ -19,6 +19,7 @@ from jeat_graph.filters import gap_survival
 from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.filtered_track import FilteredTrack, smoothed_together
+from jeat_graph.smoothers.gap_ends import known_around, whole_gaps
 from jeat_graph.smoothers.rows import Called, ModelRows, RowOutput, joined, rows_of
 from jeat_graph.smoothers.state_rts import FilterRecord
 
@@ -44,6 +45,8 @@ class StepRecord(NamedTuple):
         kept: (N,) which of them live on.
         gaps: that have been counted before tracks ended,
         gaps_after: and after it.
+        later: (N,) posterior of an object by what comes later, of those that found a detection of which that
+            is given, else -1; None where it is of none.
     """
 
     t: float
@@ -57,6 +60,7 @@ class StepRecord(NamedTuple):
     kept: BoolArray
     gaps: GapCounts
     gaps_after: GapCounts
+    later: FloatArray | None = None
 
     def track_ids(self) -> IntArray:
         """Return the identities (N,) of the tracks after it, before any ended."""
@@ -141,6 +145,7 @@ class TrackUpdate(NamedTuple):
     used: int
     confirmed: bool
     missed: float
+    later: float
     last_of_step: bool
 
 
@@ -152,12 +157,14 @@ class History:
         track_id: identity.
         called: in the rows.
         missed: what had been missed by the last entry that was given out; below 0 before the first.
+        later: what was known by later of the last detection that was given out; below 0 for nothing.
         entries: the updates.
     """
 
     track_id: int
     called: Called
     missed: float = -1.0
+    later: float = -1.0
     entries: list[TrackUpdate] = field(default_factory=list)
 
     def window(self) -> FilteredTrack:
@@ -265,6 +272,7 @@ class Histories:
             "rows": list(joined(self._rows)),
             "called": [tuple(one.called) for one in self._living],
             "missed": np.array([one.missed for one in self._living]),
+            "later": np.array([one.later for one in self._living]),
             "track_id": np.array([one.track_id for one in self._living], dtype=np.int64),
             "entries": [_columns(one.entries) for one in self._living],
         }
@@ -277,11 +285,14 @@ class Histories:
         """
         try:
             missed, ids = state["missed"].tolist(), state["track_id"].tolist()
+            later = state["later"].tolist()
             called = [Called(int(given), int(label), float(share)) for given, label, share in state["called"]]
             entries = [_entries(one) for one in state["entries"]]
             living = [
-                History(int(track), name, float(number), updates)
-                for track, name, number, updates in zip(ids, called, missed, entries, strict=True)
+                History(int(track), name, float(number), float(known), updates)
+                for track, name, number, known, updates in zip(
+                    ids, called, missed, later, entries, strict=True
+                )
             ]
             rows = joined([tuple(state["rows"])])
             gaps = GapCounts(*np.asarray(state["gaps"], dtype=np.float64))
@@ -308,9 +319,8 @@ class Histories:
         counts = [sum(entry.t <= now - self._lag_s for entry in one.entries) for one in ready]
         found = self._solver.smoothed([one.window() for one in ready], counts, True)
         for one, states in zip(ready, found, strict=True):
-            rows, count, missed = self._rows_of(one, now - self._lag_s, gaps, states)
+            rows, count, one.missed, one.later = self._rows_of(one, now - self._lag_s, gaps, states)
             self._rows.append(rows)
-            one.missed = missed
             del one.entries[:count]
             self._solver.leave(one.track_id, count)
 
@@ -342,36 +352,40 @@ class Histories:
 
     def _rows_of(
         self, history: History, until: float, gaps: GapCounts, states: tuple[FloatArray, FloatArray]
-    ) -> tuple[ModelRows, int, float]:
-        """Return a window's rows until a time (s), how many entries these are, and what the last one missed.
+    ) -> tuple[ModelRows, int, float, float]:
+        """Return a window's rows until a time (s), how many entries these are, and the last one's `History`.
 
         A row's existence is the track's posterior at that time, or where it turned out to be real for sure,
         what it turned out to be. (Less than sure tells nothing of the past: what began as a second box is
         often taken over by an object.) While nobody sees the track, it counts times the probability that a
-        gap as long as it is to the nearer one of its ends ends well.
+        gap as long as it is to the nearer one of its ends ends well. What comes later may say less of the
+        detections around a row than what the track turned out to be.
         """
         c, e = self._existence.constants, history.entries
         t = np.array([one.t for one in e])
         real, missed = np.array([one.real for one in e]), np.array([one.missed for one in e])
-        used = np.array([one.used for one in e], dtype=np.int64)
+        used, later = np.array([one.used for one in e], dtype=np.int64), np.array([one.later for one in e])
         confirmed, last = np.array([one.confirmed for one in e]), np.array([one.last_of_step for one in e])
         same = np.flatnonzero(t[1:] == t[:-1])
         for k in same.tolist():  # of one time the last one tells what all of them found
             used[k + 1] |= used[k]
             confirmed[k + 1] |= confirmed[k]
             missed[k + 1] *= not confirmed[k + 1]
+            later[k + 1] = max(later[k + 1], later[k])
         seen = np.flatnonzero(confirmed & last)
         final = float(real[seen[-1]]) if len(seen) else 0.0
         if self._existence.of_any_time:
             final = float(real.max())
         count = int(np.searchsorted(t, until, side="right"))
-        gap, before = _gaps(confirmed, missed, last), max(history.missed, 0.0)
+        gap, before = whole_gaps(confirmed, missed, last), max(history.missed, 0.0)
         told = np.flatnonzero(last[:count])
         nearer = np.minimum(missed[told], gap[told] - np.concatenate([[before], missed[told]])[:-1])
         given = told <= (seen[-1] if len(seen) else -1)
         given &= ~np.isin(told, same)  # a later step of the same time tells more
         rows = told[given]
-        is_real = np.maximum(real[rows], final) if final > c.sure else real[rows]
+        around, known = known_around(later, last, history.later, count)
+        turned = np.minimum(final, around[rows])
+        is_real = np.maximum(real[rows], turned) if final > c.sure else real[rows]
         is_real = is_real * gap_survival.survival(gaps, nearer[given], c)
         shown = is_real > c.report
         rows, is_real = rows[shown], is_real[shown]
@@ -383,16 +397,7 @@ class Histories:
             used[rows],
             self._told,
         )
-        return table, count, float(missed[told[-1]]) if len(told) else before
-
-
-def _gaps(confirmed: BoolArray, missed: FloatArray, last: BoolArray) -> FloatArray:
-    """Return how long (K,) the whole gap is that each update lies in, in expected detections; 0 in none."""
-    out, whole = np.zeros(len(missed)), 0.0
-    for k in np.flatnonzero(last)[::-1].tolist():
-        whole = 0.0 if confirmed[k] else max(whole, float(missed[k]))
-        out[k] = whole
-    return out
+        return table, count, float(missed[told[-1]]) if len(told) else before, known
 
 
 def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> TrackUpdate:
@@ -409,6 +414,7 @@ def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> Trac
         used=int(record.used[row]) if last else 0,
         confirmed=last and bool(record.confirmed[row]),
         missed=float(record.missed[row]) if last else 0.0,
+        later=float(record.later[row]) if last and record.later is not None else -1.0,
         last_of_step=last,
     )
 
@@ -437,7 +443,7 @@ def _entries(columns: Sequence[FloatArray]) -> list[TrackUpdate]:
         raise ValueError("its updates are none")
     made = []
     for t, F, before, before_cov, mean, covariance, *said in zip(*columns, strict=True):
-        sensor, real, used, confirmed, missed, last = (float(one) for one in said)
+        sensor, real, used, confirmed, missed, later, last = (float(one) for one in said)
         size = mean.shape[-1] if mean.ndim == 2 else -1
         square = (len(mean), size, size)
         shapes = {before_cov.shape, covariance.shape}
@@ -456,6 +462,7 @@ def _entries(columns: Sequence[FloatArray]) -> list[TrackUpdate]:
                 used=int(used),
                 confirmed=bool(confirmed),
                 missed=missed,
+                later=later,
                 last_of_step=bool(last),
             )
         )

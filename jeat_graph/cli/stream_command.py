@@ -208,6 +208,8 @@ def _config(args: argparse.Namespace, cameras: LiveDetecting | None) -> Config:
         return replace(config, smoother=replace(config.smoother, engine="none"))
     if config.smoother.engine == "none":
         raise ConfigError("--smoothed needs a smoother, but smoother.engine is none")
+    if config.smoother.identities == "whole":
+        raise ConfigError("smoother.identities: 'whole' needs the whole recording, which a stream never has")
     return config
 
 

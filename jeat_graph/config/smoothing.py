@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from jeat_graph.config.fields import Section, choice, number
 from jeat_graph.data.errors import InputWarning
 
+IDENTITIES = ("causal", "whole")
 ENGINES = ("fixed-lag", "full", "gtsam", "gtsam-full", "none")
 #: Names that engines had.
 FORMER = {"fixed-lag-rts": "fixed-lag", "rts": "full"}
@@ -28,6 +29,12 @@ class SmootherConfig(Section):
     )
     lag_s: float = number(
         1.0, "s", "fixed lag: a state is final once this much time has followed", open_low=True
+    )
+    identities: str = choice(
+        "causal",
+        IDENTITIES,
+        "who is who in the smoothed table. causal: as the causal table says; whole: decided once more at the "
+        "end with the whole recording in view, which is kept in memory; not for streams",
     )
     road: str = choice(
         "spline",

@@ -42,6 +42,9 @@ class Trajectories(TrajectoryViews):
         instants: (I,) all the times (s) at which the tracker gave output, ascending, those too at which it
             reported nothing; or None where that is not known, as of a data frame.
         class_ids: number of each class, as detectors gave it, by its name; or None where they gave none.
+        causal_id: (N,) where identities were decided again, that of the causal table's track whose detection
+            was the last up to this row; else None.
+        identity_probability: (N,) that this row is of the object that the identity is mostly of; or None.
         own: after `Tracker.update`, the user's detections with the tracks that took them; or None.
 
     Raises:
@@ -62,6 +65,8 @@ class Trajectories(TrajectoryViews):
     instants: FloatArray | None = None
     class_ids: Mapping[str, int] | None = None
     own: OwnDetections | None = None
+    causal_id: IntArray | None = None
+    identity_probability: FloatArray | None = None
 
     def __post_init__(self) -> None:
         n = len(self.t)
@@ -74,6 +79,12 @@ class Trajectories(TrajectoryViews):
             if getattr(self, name).shape != (n,):
                 raise DataError(f"{name} must have shape ({n},), not {getattr(self, name).shape}")
         check_classes(n, self.classes, self.class_probability)
+        for name in DECIDED:
+            column = getattr(self, name)
+            if column is not None and column.shape != (n,):
+                raise DataError(f"{name} must have shape ({n},), not {column.shape}")
+        if (self.causal_id is None) != (self.identity_probability is None):
+            raise DataError("causal_id and identity_probability go together: give both or neither")
 
     def __len__(self) -> int:
         return len(self.t)
@@ -110,6 +121,9 @@ class Trajectories(TrajectoryViews):
         for part in parts:
             ids |= part.class_ids or {}
         classes, probability = join_classes([(len(p), p.classes, p.class_probability) for p in parts])
+        filled = [part for part in parts if len(part)] or parts
+        if all(part.causal_id is not None for part in filled):
+            stacked |= {name: np.concatenate([getattr(part, name) for part in filled]) for name in DECIDED}
         known = [part.instants for part in parts if len(part) or part.instants is not None]
         told = [at for at in known if at is not None]
         return Trajectories(
@@ -155,6 +169,8 @@ def _naming(table: Trajectories, sensors: tuple[str, ...]) -> Trajectories:
 
 #: Bits of `used`.
 MOST_SENSORS = 63
+#: Names of the columns that a table has where identities were decided again.
+DECIDED = ("causal_id", "identity_probability")
 #: Names of the columns that every table has.
 COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used", "size_var")
 

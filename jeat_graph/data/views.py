@@ -41,6 +41,8 @@ class TrajectoryViews:
         class_probability: FloatArray | None
         class_ids: Mapping[str, int] | None
         own: OwnDetections | None
+        causal_id: IntArray | None
+        identity_probability: FloatArray | None
 
         def take(self, rows: npt.ArrayLike) -> Self:
             """Return some rows."""
@@ -115,6 +117,8 @@ class TrajectoryViews:
         if self.classes is not None:
             columns |= {"class": self.classes, "class_probability": self.class_probability}
         columns |= {name: self.size_var[:, k] for k, name in enumerate(SIZE_VAR)}
+        if self.causal_id is not None:
+            columns |= {"causal_id": self.causal_id, "identity_probability": self.identity_probability}
         return pd.DataFrame(columns)
 
     @classmethod

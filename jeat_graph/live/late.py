@@ -78,6 +78,8 @@ class LiveTracker(OneAtATime):
         if policy not in POLICIES:
             raise ConfigError(f"{policy!r} is not one of {', '.join(POLICIES)}")
         config = tracker.config
+        if tracker.keeps_recording:
+            raise ConfigError("smoother.identities: 'whole' needs the whole recording, in order of time")
         self.tracker = tracker
         self.policy = policy
         self.lateness = LatenessCounter()

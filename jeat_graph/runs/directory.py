@@ -40,11 +40,13 @@ _KINDS: dict[str, type[Any]] = {
 _NAMES: dict[type[Any], str] = {dict: "mapping", list: "list"}
 DIAGNOSTICS = "diagnostics.csv"
 MEASUREMENTS = "measurements.parquet"
+#: What the smoother joined (`io/tables/links_io.py`).
+LINKS = "links.csv"
 ROAD_CAUSAL, ROAD_SMOOTHED = "road_causal.csv", "road_smoothed.csv"
 TABLES = ("causal", "smoothed")
 SUFFIXES = {one.name: one.suffix for one in written_formats()}
 _TABLE_FILES = (kind + suffix for kind in TABLES for suffix in SUFFIXES.values())
-RUN_FILES = (*_TABLE_FILES, SCANS, DIAGNOSTICS, MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON)
+RUN_FILES = (*_TABLE_FILES, SCANS, LINKS, DIAGNOSTICS, MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON)
 
 
 def read_record(folder: Path) -> dict[str, Any]:

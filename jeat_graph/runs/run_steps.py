@@ -20,7 +20,8 @@ from jeat_graph.data.progress import refreshing
 from jeat_graph.io.files.piecewise import PiecewiseWriter
 from jeat_graph.io.formats.csv_table import FORMAT as CSV
 from jeat_graph.io.formats.registry import written_formats
-from jeat_graph.runs.directory import DIAGNOSTICS, MEASUREMENTS, RESUME, RunDirectory
+from jeat_graph.io.tables.links_io import write_links
+from jeat_graph.runs.directory import DIAGNOSTICS, LINKS, MEASUREMENTS, RESUME, RunDirectory
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.damage import refusing_damage
@@ -116,9 +117,13 @@ class RunSteps:
                 bar.update()
             bar.refresh()
             if self._smooths:
-                self._write("smoothed", self._tracker.finish())
+                for piece in self._tracker.finish_in_pieces():
+                    self._write("smoothed", piece)
             if self._kept is not None:
                 self._write("measured", self._kept.release())
+        links = self._tracker.identity_links()
+        if links is not None:
+            write_links(links, self._run.path(LINKS))
         taken = step_s[self._done :]
         self._sum_up(taken if len(taken) else np.zeros(1), time.perf_counter() - begin)
         return self._instants
@@ -220,8 +225,14 @@ class _Files(ExitStack):
         asked = {CSV.name, *options.formats}
         suffixes = [one.suffix for one in written_formats() if one.is_table and one.name in asked]
         kinds = ("causal", "smoothed") if config.smoother.engine != "none" else ("causal",)
+        decided = config.smoother.identities == "whole"
         writers: dict[str, list[PiecewiseWriter | MeasurementWriter]] = {
-            kind: [TrajectoryWriter(run.path(kind + suffix), classes=named) for suffix in suffixes]
+            kind: [
+                TrajectoryWriter(
+                    run.path(kind + suffix), classes=named, identities=decided and kind == "smoothed"
+                )
+                for suffix in suffixes
+            ]
             for kind in kinds
         }
         if options.diagnostics:

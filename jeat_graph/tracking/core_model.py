@@ -55,8 +55,10 @@ class CoreModel(OneModel):
         """Take in the scans of one time."""
         sides = np.concatenate([looked.boxes[:, :2], looked.boxes[:, :2] + looked.boxes[:, 2:]], axis=1)
         alike = None if looked.alike is None else np.ascontiguousarray(looked.alike)
+        owners = None if looked.owners is None else np.ascontiguousarray(looked.owners)
+        logits = logit(looked.scores)
         self._model.take(
-            looked.t, looked.sensors, looked.numbers, sides, logit(looked.scores), alike, looked.motion
+            looked.t, looked.sensors, looked.numbers, sides, logits, alike, looked.motion, owners
         )
 
     def begin_anew(self, t: float) -> None:
@@ -162,7 +164,7 @@ class CoreModel(OneModel):
     def step_record(self, record: Recorded) -> StepRecord:
         """Return the states of a step."""
         own = _own_record(record)
-        t, begins_anew, real, used, confirmed, missed, kept = own.told()
+        t, begins_anew, real, used, confirmed, missed, kept, later = own.told()
         codes, counts, born_before, *states = own.scans(self._model)
         ids = own.track_ids()
         starts, scans = np.concatenate([[0], np.cumsum(counts)]).tolist(), []
@@ -194,6 +196,7 @@ class CoreModel(OneModel):
             used=used,
             confirmed=confirmed.astype(np.bool_),
             missed=missed,
+            later=later,
             kept=kept.astype(np.bool_),
             gaps=GapCounts(*own.gaps()),
             gaps_after=GapCounts(*own.gaps_after()),

@@ -33,6 +33,10 @@ class StepInput(NamedTuple):
         alike: (N, M) how much more likely each box is of a living track than of another by what both look
             like, as ln of the ratio; None where nothing is known.
         motion: (11,) of the camera since its picture before, as `PictureMotion` has it; or None.
+        owners: (M, 3) where who is who is given: whose each box is, below 0 for nobody's, at most one box
+            of a sensor each; 1 where more of its owner's are to come; posterior of an object there by what
+            comes later, for the smoother, below 0 where it is not known. A track of an owner takes no box
+            but its own, and lives as long as it is awaited. None where the engine decides.
     """
 
     t: float
@@ -42,6 +46,7 @@ class StepInput(NamedTuple):
     scores: FloatArray
     alike: FloatArray | None = None
     motion: FloatArray | None = None
+    owners: FloatArray | None = None
 
 
 class StepBoxes(NamedTuple):
@@ -103,11 +108,19 @@ class TrackEngine(Protocol):
     def compares_looks(self) -> bool:
         """Whether it takes what boxes look like."""
 
+    @property
+    def takes_owners(self) -> bool:
+        """Whether it can be given who is who."""
+
     def declare_sensor(self, name: str, said: SensorConfig) -> None:
         """Add a sensor that has not looked yet, with what the user says of it."""
 
     def take(self, looked: StepInput) -> None:
-        """Take in the scans of one time, which is not before that of the last step."""
+        """Take in the scans of one time, which is not before that of the last step.
+
+        Raises:
+            JeatGraphError: owners are given to an engine that takes none.
+        """
 
     def begin_anew(self, t: float) -> None:
         """End all tracks and go on from another time (s), as if none had passed; what was learnt stays."""

@@ -26,6 +26,7 @@ class Heaps:
     def __init__(self, engine: str, constants: ModelConstants) -> None:
         self._engine, self._constants = engine, constants
         self._said: set[str] = set()
+        self._quiet = False
 
     def kept(self, batch: Sequence[Scan]) -> BoolArray | None:
         """Return which boxes (M,) of the scans, one after the other, count; None where all do."""
@@ -36,6 +37,10 @@ class Heaps:
             parts.append(self._of_scan(scan))
         whole = np.concatenate(parts)
         return None if whole.all() else whole
+
+    def end(self) -> None:
+        """Say nothing of any scan any more."""
+        self._quiet = True
 
     def _of_scan(self, scan: Scan) -> BoolArray:
         out = np.ones(len(scan), dtype=np.bool_)
@@ -52,7 +57,7 @@ class Heaps:
         return out
 
     def _say(self, scan: Scan, kept: int) -> None:
-        if scan.sensor in self._said:
+        if self._quiet or scan.sensor in self._said:
             return
         c = self._constants
         # Up from here: a scan, all scans, the tracker's `take_in`, `step` with its lock, and its caller.

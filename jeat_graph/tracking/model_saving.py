@@ -14,6 +14,7 @@ from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.engine import Moment, StepBoxes, TrackEngine
+from jeat_graph.tracking.identities.log import IdentityLog
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothed_instants import SmoothedInstants
 
@@ -56,6 +57,7 @@ class SavedModel:
         _class_ids: dict[str, int]
         _called: list[str]
         _instants: SmoothedInstants
+        _log: IdentityLog | None
 
         def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
             """Make a tracker."""
@@ -112,6 +114,7 @@ class SavedModel:
             "class_ids": self._class_ids,
             "called": self._called,
             "instants": self._instants.state(),
+            "log": None if self._log is None else self._log.state(),
         }
 
     @classmethod
@@ -140,6 +143,10 @@ class SavedModel:
         moment = model.snapshot()
         tracker.restore(ModelSnapshot(moment, sensors, state["classes"], state["looks"], order, given, boxes))
         tracker._finished, tracker._called = bool(state["finished"]), called
+        if (tracker._log is None) != (state["log"] is None):
+            raise DataError("is damaged: detections of the recording are missing")
+        if tracker._log is not None:
+            tracker._log = IdentityLog.from_state(state["log"])
         tracker._class_ids = {str(name): int(number) for name, number in state["class_ids"].items()}
         _check_labels(state["model"], len(called))
         tracker._instants.set_state(state["instants"])

@@ -17,6 +17,7 @@ from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
+from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.rig.common_picture import CommonPicture
@@ -29,6 +30,8 @@ from jeat_graph.tracking.engines import make_engine
 from jeat_graph.tracking.first_sight import wider
 from jeat_graph.tracking.heaps import Heaps
 from jeat_graph.tracking.hypotheses import Hypotheses
+from jeat_graph.tracking.identities.log import IdentityLog
+from jeat_graph.tracking.identities.passes import took
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import diagnostics_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
@@ -36,9 +39,11 @@ from jeat_graph.tracking.model_tables import ClassNames, Places, table_of, with_
 from jeat_graph.tracking.one_at_a_time import OneAtATime, one_at_a_time
 from jeat_graph.tracking.pending_step import PendingStep
 from jeat_graph.tracking.prediction import Prediction, of_motion, still_there, time_from
+from jeat_graph.tracking.record_smoothing import unsmoothed
 from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
 from jeat_graph.tracking.sensor_state import SensorState
 from jeat_graph.tracking.smoothed_instants import SmoothedInstants
+from jeat_graph.tracking.smoothed_tables import SmoothedTables
 from jeat_graph.tracking.updates import Updates
 
 #: Most sensors: the columns of `Trajectories.used` are the bits of a signed number.
@@ -57,10 +62,10 @@ def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
 
 @one_at_a_time(
     "step take_in hand_over snapshot restore begin_anew number_on_from takers living last_looks meet causal "
-    "rows_below_least predict last_updates last_measurements smoothed drain_smoothed settle finish state "
-    "hypotheses learnt sensor_states"
+    "rows_below_least predict last_updates last_measurements smoothed drain_smoothed settle finish "
+    "finish_in_pieces identity_links state hypotheses learnt sensor_states"
 )
-class ModelTracker(Updates, SavedModel, OneAtATime):
+class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
     """An engine as a tracker.
 
     Sensors have any names and are known from their first scan on. Boxes are reported up to the edge of the
@@ -104,8 +109,11 @@ class ModelTracker(Updates, SavedModel, OneAtATime):
         self._places = Places(())  # where these stand among all
         self.logs_takers = True
         self._diagnostics = diagnostics
-        self._smooths = config.smoother.engine != "none"
-        self._model: TrackEngine = make_engine(config, constants)
+        wanted, whole = config.smoother.engine != "none", config.smoother.identities == "whole"
+        self._smooths = wanted and not whole
+        self._log = IdentityLog() if wanted and whole else None
+        self._links: IdentityLinks | None = None
+        self._model: TrackEngine = make_engine(config if self._smooths else unsmoothed(config), constants)
         if diagnostics and not self._model.has_fit:
             raise JeatGraphError(f"engine {self._model.name} has no diagnostics")
         self._heaps = Heaps(config.tracker.engine, self.constants)
@@ -121,6 +129,19 @@ class ModelTracker(Updates, SavedModel, OneAtATime):
         self._boxes = StepBoxes.none()
         self._instants = SmoothedInstants(config)
         self._finished = False
+
+    def anew(self, *, smooths: bool = True, constants: ModelConstants | None = None) -> ModelTracker:
+        """Return a new tracker of this configuration, with causal identities, that warns of no input again.
+
+        Args:
+            smooths: whether it has a smoother.
+            constants: by default this one's.
+        """
+        config = replace(self.config, smoother=replace(self.config.smoother, identities="causal"))
+        made = ModelTracker(config if smooths else unsmoothed(config), constants=constants or self.constants)
+        made._watch.end()
+        made._heaps.end()
+        return made
 
     @property
     def num_tracks(self) -> int:
@@ -180,11 +201,12 @@ class ModelTracker(Updates, SavedModel, OneAtATime):
             self._model.hand_over(None, None, *self._called_now())
         return self.causal()
 
-    def take_in(self, batch: Sequence[Scan]) -> PendingStep | None:
+    def take_in(self, batch: Sequence[Scan], owners: FloatArray | None = None) -> PendingStep | None:
         """Do a step for a caller who may have to take it back, and hands it to the smoothers later.
 
         Args:
             batch: scans of one and the same time, in the common picture.
+            owners: (M, 3) of their detections where who is who is given, as `StepInput` has them.
 
         Returns:
             What `hand_over` takes; None without a smoother. `causal` has the tracks that are reported.
@@ -194,13 +216,13 @@ class ModelTracker(Updates, SavedModel, OneAtATime):
             JeatGraphError: after `finish`.
         """
         self.meet(batch)
-        self._take_in(batch)
+        self._take_in(batch, owners)
         if not self._smooths:
             return None
         ids, t = self._model.living(), float(batch[0].t)
         return PendingStep(self._model.record(), t, ids, *self._called_now())
 
-    def _take_in(self, batch: Sequence[Scan]) -> None:
+    def _take_in(self, batch: Sequence[Scan], owners: FloatArray | None = None) -> None:
         if self._finished:
             raise JeatGraphError(_FINISHED)
         t, now = float(batch[0].t), self.time
@@ -225,8 +247,11 @@ class ModelTracker(Updates, SavedModel, OneAtATime):
         numbers = np.bincount(sensor[order], minlength=len(self._looked))[looking].astype(np.int64)
         compared = None if embeddings is None else self._compare(embeddings, sensor)
         alike = None if compared is None else compared.log_ratio[:, order]
-        self._model.take(StepInput(t, looking, numbers, boxes, scores, alike, _surest_motion(batch)))
+        given = None if owners is None else owners[order]
+        self._model.take(StepInput(t, looking, numbers, boxes, scores, alike, _surest_motion(batch), given))
         self._order, self._given, self._causal = order, len(sensor), None
+        if self._log is not None:
+            self._log.add(batch, took(self, len(sensor)), kept)
         if self._diagnostics:
             self._boxes = StepBoxes(t, sensor[order], boxes)
         self._count_classes(batch)
@@ -365,36 +390,6 @@ class ModelTracker(Updates, SavedModel, OneAtATime):
         for batch in detections.batches():
             yield self.step(batch)
 
-    def smoothed(self) -> Trajectories:
-        """Return the smoothed trajectories so far, without what was drained.
-
-        Raises:
-            JeatGraphError: the configuration asks for no smoother.
-        """
-        self._check_smooths()
-        return self._smoothed_table(self._model.smoothed())
-
-    def drain_smoothed(self) -> Trajectories:
-        """Return the smoothed rows that are final and forget them.
-
-        Raises:
-            JeatGraphError: the configuration asks for no smoother.
-        """
-        self._check_smooths()
-        return self._smoothed_table(self._model.drain())
-
-    def settle(self) -> None:
-        """Have the smoother be as one that was saved and loaded."""
-        self._model.settle()
-
-    def finish(self) -> Trajectories:
-        """End all tracks and return their smoothed trajectories; empty when called again."""
-        rows = Trajectories.empty(self.sensor_names)
-        if self._smooths and not self._finished:
-            rows = self._smoothed_table(self._model.finish())
-        self._finished = True
-        return rows
-
     def hypotheses(self) -> Hypotheses:
         """Return what the living tracks are taken for, and why (`jeat-graph explain`).
 
@@ -423,10 +418,6 @@ class ModelTracker(Updates, SavedModel, OneAtATime):
     def looked(self) -> tuple[str, ...]:
         """Names of the sensors that have looked, in the order in which the engine counts them."""
         return self._looked
-
-    def _check_smooths(self) -> None:
-        if not self._smooths:
-            raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
 
     def _check_diagnostics(self) -> None:
         if not self._diagnostics:

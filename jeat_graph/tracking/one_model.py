@@ -76,6 +76,7 @@ class OneModel(SmoothsRecords):
     has_fit = True
     weighs = True
     compares_looks = True
+    takes_owners = True
 
     def __init__(self, constants: ModelConstants, config: Config, by_records: bool = True) -> None:
         told, existence = told_of(constants), Existence(constants)

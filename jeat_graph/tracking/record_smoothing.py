@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from dataclasses import replace
 
 from jeat_graph.config.schema import Config
 from jeat_graph.config.smoothing import LAGGED
@@ -20,6 +21,11 @@ def lag_of(config: Config) -> float:
     if engine == "none":
         return -1.0
     return config.smoother.lag_s if engine in LAGGED else math.inf
+
+
+def unsmoothed(config: Config) -> Config:
+    """Return a configuration without a smoother."""
+    return replace(config, smoother=replace(config.smoother, engine="none"))
 
 
 def histories_of(config: Config, existence: Existence, told: RowOutput) -> Histories | None:

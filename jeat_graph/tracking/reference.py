@@ -137,6 +137,7 @@ def step(
         count_gaps(state, scan, pairs, c)
         learn_noise(state, scan, pairs, clock, c)
         before = update(state, pairs, c)
+        await_more(state, scan, pairs)
         count_hits_and_misses(state, scan, pairs, clock, c)
         free = count_clutter(state, scan, pairs, c)
         begin_tracks(state, scan, free, clock, c)
@@ -276,6 +277,7 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     clutter = likelihood_ratio.clutter_log_density(size, float(state.leftovers[k]), state.picture, c)
     present = tracks.presence[:, VISIBLE] * p_detect
     ratio = likelihood_ratio.pair_log_ratio(density, present, score, clutter)
+    ratio = by_owner(ratio, tracks.given, scan.owners)
     track, box = assign(by_looks(ratio, scan.alike), c.exact_assignment)
     seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track, box]
     nis = (seen[0].mean(axis=2) ** 2 / seen[1].mean(axis=(2, 3))).sum(axis=1)
@@ -283,6 +285,17 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     by_itself = score_calibration.box_probability(scan.boxes, scan.logits, indifference)
     confirms = by_itself[box] >= c.confirming
     return AssociatedPairs(track, box, ratio[track, box], p_detect, confirms, innovation, nis)
+
+
+def by_owner(ratio: FloatArray, owner: IntArray, owners: IntArray | None) -> FloatArray:
+    """Return ln L (N, M) where who is who is given: tracks with an owner (N,) take its boxes (M,), no others.
+
+    A box is taken however far off it lies: that is no reason to doubt that the track is real.
+    """
+    given = np.full(ratio.shape[1], -1) if owners is None else owners
+    owned = (owner >= 0)[:, None] | (given >= 0)[None]
+    same = owned & (owner[:, None] == given[None])
+    return np.where(same, np.maximum(ratio, _LEAST_GAIN), np.where(owned, 0.0, ratio))
 
 
 def by_looks(ratio: FloatArray, alike: FloatArray | None) -> FloatArray:
@@ -351,6 +364,14 @@ def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> 
     mean[i], covariance[i] = box_sides.update(m, P, y, H, R)
     state.tracks = replace(tracks, mean=mean, covariance=covariance)
     return before
+
+
+def await_more(state: ReferenceState, scan: SensorScan, pairs: AssociatedPairs) -> None:
+    """Write down of tracks whose boxes are given whether more are to come."""
+    if scan.awaited is not None:
+        awaited = state.tracks.awaited.copy()
+        awaited[pairs.track] = scan.awaited[pairs.box]
+        state.tracks = replace(state.tracks, awaited=awaited)
 
 
 def count_hits_and_misses(

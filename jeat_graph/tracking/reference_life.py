@@ -41,6 +41,8 @@ def begin_tracks(
     mean, covariance = box_sides.initial_state(boxes, scan.edges[free], *noise, c)
     mean = with_velocity(mean, state.camera_velocity)
     new = ReferenceTracks.begun(ids, mean, covariance, evidence)
+    if scan.owners is not None and scan.awaited is not None:
+        new = replace(new, given=scan.owners[free], awaited=scan.awaited[free])
     state.tracks, state.next_id = tracks.append(new), state.next_id + len(free)
 
 
@@ -130,6 +132,7 @@ def end_tracks(state: ReferenceState, t: float, c: ModelConstants) -> None:
     ends |= (real < c.false_posterior) & (gap > c.false_gap_s)
     ends |= 1.0 - state.tracks.presence[:, GONE] < c.least_presence
     ends |= (share_inside(state) < c.outside_share) & (gap > c.outside_gap_s)
+    ends &= ~state.tracks.awaited
     if ends.any():
         state.gaps = gap_survival.count_losses(state.gaps, int((real[ends] > c.report).sum()))
         ended = state.ended.append(state.tracks.evidence.take(ends))

@@ -79,7 +79,7 @@ class ReferenceModel(OneModel):
 
     def take(self, looked: StepInput) -> None:
         """Take in the scans of one time."""
-        t, alike, motion = looked.t, looked.alike, looked.motion
+        t, alike, motion, owners = looked.t, looked.alike, looked.motion, looked.owners
         sides = np.concatenate([looked.boxes[:, :2], looked.boxes[:, :2] + looked.boxes[:, 2:]], axis=1)
         logits, ends = logit(looked.scores), np.cumsum(looked.numbers)
         begins_anew = self._state.t is not None and t - self._state.t >= _LONGEST_SILENCE_S
@@ -92,6 +92,8 @@ class ReferenceModel(OneModel):
                 sides[end - n : end],
                 logits[end - n : end],
                 None if alike is None else alike[:, end - n : end],
+                owners=None if owners is None else owners[end - n : end, 0].astype(np.int64),
+                awaited=None if owners is None else owners[end - n : end, 1] > 0,
             )
             for k, n, end in zip(looked.sensors, looked.numbers, ends, strict=True)
         ]
@@ -112,9 +114,10 @@ class ReferenceModel(OneModel):
         kept = np.isin(tracks.track_id, self._state.tracks.track_id)
         confirmed = tracks.evidence.confirmed_s == t
         missed = np.where(confirmed, 0.0, tracks.evidence.missed)
+        later = _later(tracks.track_id, self._answer.takers, owners)
         flags = tracks.real, tracks.used, confirmed, missed, kept
         gaps = done.gaps, self._state.gaps
-        self._last = StepRecord(t, begins_anew, tracks.track_id, done.records, *flags, *gaps)
+        self._last = StepRecord(t, begins_anew, tracks.track_id, done.records, *flags, *gaps, later)
 
     def record(self) -> StepRecord:
         """Return what the last step gave the smoother."""
@@ -229,6 +232,14 @@ class ReferenceModel(OneModel):
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Refuse: the reference is not saved."""
         raise lacking(self.name, "is not saved; tracker.engine=core is")
+
+
+def _later(track_id: IntArray, takers: IntArray, owners: FloatArray | None) -> FloatArray:
+    """Return what is known by later (N,) of the tracks that took a box; -1 for the others."""
+    out = np.full(len(track_id), -1.0)
+    if owners is not None:
+        np.maximum.at(out, np.searchsorted(track_id, takers), owners[:, 2])
+    return out
 
 
 def _no_answer() -> Answer:

@@ -52,6 +52,8 @@ class ReferenceTracks(ArrayTable):
         log_odds: (N,) its log odds.
         sees: (N, S) probability that a sensor is not blind to it as it moves now.
         used: (N,) bit k is set where sensor k has found it at the time of this step.
+        given: (N,) whose boxes it takes where that is given, -1 for any that are nobody's.
+        awaited: (N,) whether more boxes of its owner are to come.
     """
 
     PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
@@ -73,6 +75,8 @@ class ReferenceTracks(ArrayTable):
     log_odds: FloatArray
     sees: FloatArray
     used: IntArray
+    given: IntArray
+    awaited: BoolArray
 
     def __len__(self) -> int:
         return len(self.track_id)
@@ -97,6 +101,8 @@ class ReferenceTracks(ArrayTable):
             log_odds=np.zeros(number),
             sees=np.zeros((number, sensors)),
             used=np.int64(1) << evidence.owner,
+            given=np.full(number, -1, dtype=np.int64),
+            awaited=np.zeros(number, dtype=np.bool_),
         )
 
     @classmethod
@@ -117,6 +123,9 @@ class SensorScan(NamedTuple):
         alike: (N, M) ln of how much more likely each box is of a track than of another by what both look
             like, of the first N tracks; None where nothing is known of that.
         edges: (M, 2, 2) by axis and side which end at the edge of the picture; `correct_boxes` writes it.
+        owners: (M,) whose each box is, -1 for nobody's, at most one of each owner; None where the tracker
+            decides.
+        awaited: (M,) whether more boxes of its owner are to come; given with `owners`.
     """
 
     sensor: int
@@ -124,6 +133,8 @@ class SensorScan(NamedTuple):
     logits: FloatArray
     alike: FloatArray | None = None
     edges: BoolArray = np.zeros((0, 2, 2), dtype=np.bool_)
+    owners: IntArray | None = None
+    awaited: BoolArray | None = None
 
 
 @dataclass

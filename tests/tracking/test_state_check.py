@@ -119,6 +119,7 @@ def test_a_pipe_is_not_waited_for(tmp_path):
         "called",
         "finished",
         "diagnostics",
+        "log",
     ],
 )
 def test_a_state_without_a_part_is_refused(tracker, tmp_path, key):
@@ -199,6 +200,7 @@ FORGED = {
     "tracks.recent_misses": [-1.0],
     "tracks.real": [1.5, -0.5],
     "tracks.sees": [-0.5, 1.5],
+    "tracks.awaited": [2],
     "tracks.covariance": [-1.0, 0.0, np.nan],
     "tracks.mean": [1e71, np.nan],
     "sensor0.leftovers": [-1.0],
@@ -224,6 +226,8 @@ FORGED = {
     "histories.t": [np.nan, -1e9, 1e9],
     "histories.dt": [-1.0, np.nan],
     "histories.real": [2.0],
+    "histories.later": [2.0, np.nan],
+    "histories.last_later": [2.0, np.nan],
     "histories.given": [0, -3],
     "histories.covariance": [-1.0],
     "histories.predicted_mean": [1e71],

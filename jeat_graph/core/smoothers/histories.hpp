@@ -79,6 +79,7 @@ inline void unfold(const Halves& halves, double* out) {
 struct Entry {
     double t, dt;       // time, and since the last update (s)
     double real = 0.0;  // posterior after the step, where this was its last update
+    double later = -1.0;  // posterior by what comes later, where a detection was found and that is given
     std::int64_t used = 0;
     bool confirmed = false;  // by a detection of that time
     double missed = 0.0;     // detections that were to be expected since one did; 0 where it is of that time
@@ -126,6 +127,7 @@ struct History {
     Called called;
     // What had been missed by the last entry that was given out; below 0 before the first.
     double missed = -1.0;
+    double last_later = -1.0;  // of the last detection before the first entry
     std::vector<Entry> entries;
 };
 
@@ -236,6 +238,7 @@ private:
                 entries[k + 1].used |= entries[k].used;
                 entries[k + 1].confirmed |= entries[k].confirmed;
                 if (entries[k + 1].confirmed) entries[k + 1].missed = 0.0;
+                entries[k + 1].later = std::max(entries[k + 1].later, entries[k].later);
             }
         double final_real = 0.0, whole = 0.0;
         bool seen_again = false;
@@ -249,14 +252,26 @@ private:
             whole = entries[k].confirmed ? 0.0 : std::max(whole, entries[k].missed);
             if (seen_again) gap_[k] = whole;
         }
+        // Of a gap both ends must be of an object. Where nothing later is known, what it turned out to be is.
+        later_.assign(n, 1.0);
+        double behind = -1.0, before = history.last_later;
+        for (std::size_t k = n; k-- > 0;) {
+            if (entries[k].last_of_step && entries[k].later >= 0.0) behind = entries[k].later;
+            if (behind >= 0.0) later_[k] = behind;
+        }
+        for (std::size_t k = 0; k < n; ++k) {
+            if (entries[k].last_of_step && entries[k].later >= 0.0) before = entries[k].later;
+            if (before >= 0.0) later_[k] = std::min(later_[k], before);
+        }
         std::size_t given = 0;
-        double before = std::max(history.missed, 0.0);
+        double missed_before = std::max(history.missed, 0.0), last_later = history.last_later;
         for (; given < n && entries[given].t <= until; ++given) {
             const Entry& e = entries[given];
             if (!e.last_of_step) continue;
-            const double nearer = std::min(e.missed, gap_[given] - before);
-            before = e.missed;
-            double real = final_real > c.sure ? std::max(e.real, final_real) : e.real;
+            if (e.later >= 0.0) last_later = e.later;
+            const double nearer = std::min(e.missed, gap_[given] - missed_before);
+            missed_before = e.missed;
+            double real = final_real > c.sure ? std::max(e.real, std::min(final_real, later_[given])) : e.real;
             if (gap_[given] == kNotSeenAgain) continue;
             if (given + 1 < n && entries[given + 1].t == e.t) continue;  // a later step of the same time tells more
             real *= gaps.survival(nearer, c);
@@ -264,7 +279,8 @@ private:
                 out.add(e.t, history.called, mean_[given].data(), covariance_[given].data(), real, e.used, c);
         }
         if (!forget) return;
-        history.missed = before;
+        history.missed = missed_before;
+        history.last_later = last_later;
         entries.erase(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(given));
     }
 
@@ -283,7 +299,8 @@ private:
     Rows rows_;
     std::vector<std::array<double, kMean>> mean_;
     std::vector<std::array<double, kCovariance>> covariance_;
-    std::vector<double> gap_;  // of each entry, the whole gap that it lies in
+    std::vector<double> gap_;    // of each entry, the whole gap that it lies in
+    std::vector<double> later_;  // of each, what comes later says of the detections around it
 };
 
 }  // namespace jeat::smoothers

@@ -70,19 +70,25 @@ Scans scans_of(const Record& record, const ModelConstants& c) {
             array_of(predicted_covariance, kCovariance), array_of(mean, kMean), array_of(covariance, kCovariance)};
 }
 
-using Told = std::tuple<double, bool, Out<double>, Out<std::int64_t>, Out<std::uint8_t>, Out<double>, Out<std::uint8_t>>;
+using Told = std::tuple<double, bool, Out<double>, Out<std::int64_t>, Out<std::uint8_t>, Out<double>, Out<std::uint8_t>,
+                        Out<double>>;
 
 Told told_of(const Record& record) {
     std::vector<double> real, missed;
     std::vector<std::int64_t> used;
     std::vector<std::uint8_t> confirmed;
+    // Of every scan that has it: tracks keep their places from scan to scan.
+    std::vector<double> later(record.track_id.size(), -1.0);
+    std::size_t at = 0;
+    for (const std::size_t number : record.tracks)
+        for (std::size_t i = 0; i < number; ++i) later[i] = std::max(later[i], record.entries[at++].later);
     for (std::size_t k = record.entries.size() - record.track_id.size(); k < record.entries.size(); ++k) {
         const smoothers::Entry& entry = record.entries[k];
         real.push_back(entry.real), used.push_back(entry.used);
         confirmed.push_back(entry.confirmed), missed.push_back(entry.missed);
     }
     return {record.t, record.begins_anew, array_of(real), array_of(used), array_of(confirmed), array_of(missed),
-            array_of(record.kept)};
+            array_of(record.kept), array_of(later)};
 }
 
 // Gaps that outlasted each bin, and of these those that ended well.
@@ -111,7 +117,8 @@ public:
     }
 
     void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
-              const std::optional<In2<double>>& alike, const std::optional<In<double>>& motion) {
+              const std::optional<In2<double>>& alike, const std::optional<In<double>>& motion,
+              const std::optional<In2<double>>& owners) {
         State& state = now_.state;
         check(std::isfinite(t), "no such time");
         check(!state.started || t >= state.t, "a time before that of the last step");
@@ -122,6 +129,9 @@ public:
         if (alike) check(alike->shape(0) == state.tracks.size(), "another number of tracks is compared");
         if (alike) check_lengths({alike->shape(1), logits.size()});
         if (alike) check(finite(span(*alike)), "what looks say is finite");
+        if (owners) check_lengths({owners->shape(0), logits.size()});
+        if (owners) check(owners->shape(1) == 3, "owners are given with whether more of theirs are to come, and a posterior");
+        if (owners) check(finite(span(*owners)), "owners are finite");
         std::optional<PictureMotion> moved;
         if (motion) {
             check_lengths({motion->size(), kMotionNumbers});
@@ -141,6 +151,12 @@ public:
             scan.logits.assign(logits.data() + at, logits.data() + at + number);
             scan.alike = {nullptr, 0, 0};
             if (alike) scan.alike = {alike->data() + at, alike->shape(0), alike->shape(1)};
+            scan.owners.clear(), scan.awaited.clear(), scan.later.clear();
+            for (std::size_t j = at; owners && j < at + number; ++j) {
+                scan.owners.push_back(static_cast<std::int64_t>(owners->data()[3 * j]));
+                scan.awaited.push_back(owners->data()[3 * j + 1] > 0.0);
+                scan.later.push_back(owners->data()[3 * j + 2]);
+            }
             at += number;
         }
         check(at == logits.size(), "more boxes than said");
@@ -410,11 +426,14 @@ void bind(nb::module_& module) {
              "NaN where it is to be learnt.")
         .def("take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
              nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("alike").noconvert() = nb::none(),
-             nb::arg("motion").noconvert() = nb::none(),
+             nb::arg("motion").noconvert() = nb::none(), nb::arg("owners").noconvert() = nb::none(),
              "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
              "top, right, bottom (px), logits of their scores (M,); alike (N, M): how much more likely each box is of a\n"
              "living track than of another by what both look like, as ln of the ratio; motion (11,): of the camera since\n"
-             "its picture before, see jeat_graph.filters.picture_motion.PictureMotion.")
+             "its picture before, see jeat_graph.filters.picture_motion.PictureMotion; owners (M, 3): whose each box is,\n"
+             "where that is given, below 0 for nobody's, at most one box of a scan each, and 1 where more of its owner's are\n"
+             "to come, and the posterior of an object there by what comes later, for the smoother, below 0 where it is not\n"
+             "known. A track of an owner takes no box but its own, and lives as long as it is awaited.")
         .def("record", exclusive(&Model::record), "What the last step gave the smoother; once.")
         .def("hand_over", exclusive(&Model::hand_over), nb::arg("record").none() = nb::none(),
              nb::arg("given").noconvert() = nb::none(), nb::arg("label").noconvert() = nb::none(),

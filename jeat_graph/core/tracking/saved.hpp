@@ -251,7 +251,7 @@ inline constexpr std::size_t kWide = 2 * smoothers::kHalf;
 
 // The entries of all histories in columns.
 struct EntryColumns {
-    std::vector<double> t, dt, real, missed, predicted_mean, mean, predicted_covariance, covariance;
+    std::vector<double> t, dt, real, later, missed, predicted_mean, mean, predicted_covariance, covariance;
     std::vector<std::int64_t> used;
     std::vector<std::uint8_t> confirmed, last_of_step;
 
@@ -260,8 +260,8 @@ struct EntryColumns {
         for (auto* one : {&predicted_covariance, &covariance}) one->reserve(entries * kWide);
     }
     void add(Entry& entry) {
-        auto& [at, since, posterior, sensors, sure, gap, last, m0, m1, p0, p1] = entry;
-        t.push_back(at), dt.push_back(since), real.push_back(posterior);
+        auto& [at, since, posterior, by_later, sensors, sure, gap, last, m0, m1, p0, p1] = entry;
+        t.push_back(at), dt.push_back(since), real.push_back(posterior), later.push_back(by_later);
         used.push_back(sensors), confirmed.push_back(sure), missed.push_back(gap), last_of_step.push_back(last);
         predicted_mean.insert(predicted_mean.end(), m0.begin(), m0.end());
         mean.insert(mean.end(), m1.begin(), m1.end());
@@ -270,7 +270,7 @@ struct EntryColumns {
     }
     Entry at(std::size_t k) const {
         Entry entry;
-        entry.t = t[k], entry.dt = dt[k], entry.real = real[k];
+        entry.t = t[k], entry.dt = dt[k], entry.real = real[k], entry.later = later[k];
         entry.used = used[k], entry.confirmed = confirmed[k], entry.missed = missed[k], entry.last_of_step = last_of_step[k];
         std::copy_n(&predicted_mean[k * kMean], kMean, entry.predicted_mean.begin());
         std::copy_n(&mean[k * kMean], kMean, entry.mean.begin());
@@ -283,15 +283,15 @@ struct EntryColumns {
 template <class Visitor> void visit_histories(Visitor& v, Histories& histories) {
     std::vector<History>& living = histories.living();
     std::vector<std::int64_t> track_id, given, label, counts;
-    std::vector<double> share, given_missed;
+    std::vector<double> share, given_missed, last_later;
     EntryColumns columns;
     std::size_t expected = 0;
     for (const History& history : living) expected += history.entries.size();
     columns.reserve(expected);
     for (History& history : living) {
-        auto& [id, called, out, entries] = history;
+        auto& [id, called, out, after, entries] = history;
         track_id.push_back(id), given.push_back(called.track_id), label.push_back(called.label);
-        share.push_back(called.share), given_missed.push_back(out);
+        share.push_back(called.share), given_missed.push_back(out), last_later.push_back(after);
         counts.push_back(static_cast<std::int64_t>(entries.size()));
         for (Entry& entry : entries) columns.add(entry);
     }
@@ -304,9 +304,11 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     v.column("histories.counts", counts, tracks, 1);
     v.column("histories.share", share, tracks, 1, Values::any);
     v.column("histories.given_missed", given_missed, tracks, 1);
+    v.column("histories.last_later", last_later, tracks, 1);
     v.column("histories.t", columns.t, total, 1, Values::any);
     v.column("histories.dt", columns.dt, total, 1);
     v.column("histories.real", columns.real, total, 1);
+    v.column("histories.later", columns.later, total, 1);
     v.column("histories.used", columns.used, total, 1);
     v.column("histories.confirmed", columns.confirmed, total, 1);
     v.column("histories.missed", columns.missed, total, 1);
@@ -326,6 +328,7 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
             history.track_id = track_id[i];
             history.called = {given[i], label[i], share[i]};
             history.missed = given_missed[i];
+            history.last_later = last_later[i];
             for (std::size_t k = 0; k < count; ++k) history.entries.push_back(columns.at(at + k));
             at += count;
         }

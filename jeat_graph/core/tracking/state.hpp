@@ -35,6 +35,9 @@ struct Tracks {
     std::vector<double> innovation;            // learn_noise
     std::vector<std::uint8_t> has_innovation;
     std::vector<double> real, log_odds, sees;  // judge
+    // Where who is who is given: whose boxes it takes, below 0 for any that are nobody's; and whether more are to come.
+    std::vector<std::int64_t> given;           // begin_tracks
+    std::vector<std::uint8_t> awaited;         // begin_tracks, update
     Evidence evidence;                         // count_hits_and_misses, compare_overlaps
 
     std::size_t size() const { return track_id.size(); }
@@ -57,6 +60,8 @@ struct Tracks {
         visit("real", real, 1);
         visit("log_odds", log_odds, 1);
         visit("sees", sees, S);
+        visit("given", given, 1);
+        visit("awaited", awaited, 1);
     }
     template <class Visit> void columns(Visit visit) {
         own_columns(visit);

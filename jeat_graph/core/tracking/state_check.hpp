@@ -130,6 +130,7 @@ inline void check_tracks(const Tracks& tracks, const State& state) {
     check_flags("tracks.has_innovation", tracks.has_innovation);
     check_between("tracks.innovation", tracks.innovation, -kMostLogVariance, kMostLogVariance);
     check_between("tracks.real", tracks.real, 0.0, 1.0);
+    check_flags("tracks.awaited", tracks.awaited);
     check_between("tracks.sees", tracks.sees, 0.0, 1.0 + kShareRounding);
     check_evidence("tracks.", tracks.evidence, state.t);
 }
@@ -221,10 +222,11 @@ inline void check_entries(const History& history, const State& state) {
     const std::string name = "histories";
     double before = -std::numeric_limits<double>::infinity();
     require(history.missed >= -1.0 && history.missed <= kMostCount, name, "have missed less than nothing");
+    require(history.last_later <= 1.0, name, "hold what is no probability");
     for (const Entry& entry : history.entries) {
         require(entry.t >= before && entry.t <= state.t && entry.dt >= 0.0, name, "are in no order of time");
         require(entry.missed >= 0.0 && entry.missed <= kMostCount, name, "have missed less than nothing");
-        require(entry.real >= 0.0 && entry.real <= 1.0, name, "hold what is no probability");
+        require(entry.real >= 0.0 && entry.real <= 1.0 && entry.later <= 1.0, name, "hold what is no probability");
         check_sensors(name, {entry.used}, state.sensors.size());
         before = entry.t;
         for (const auto* mean : {&entry.mean, &entry.predicted_mean})

@@ -32,6 +32,11 @@ struct Scan {
     std::vector<double> logits;
     // How much more likely each box is of a track than of another by its looks: ln ratio, (tracks, boxes).
     View2<const double> alike{nullptr, 0, 0};
+    // Where who is who is given: whose each box is, below 0 for nobody's, and whether later ones are the same one's.
+    // Empty where the tracker decides. At most one box of a scan has the same owner.
+    std::vector<std::int64_t> owners;
+    std::vector<std::uint8_t> awaited;
+    std::vector<double> later;         // posteriors by what comes later, to the smoother
     std::vector<std::int64_t> takers;  // written: the track that each box went to
     std::vector<double> nis;           // written: squared distance of its centre, NaN where it began a track
     double noise_scale = 1.0;          // written: variance of the sensor's sides, 1 before anything was learnt
@@ -60,11 +65,12 @@ public:
             count_gaps();
             learn_noise(scan, clock);
             update(record);
+            await(scan);
             count_hits_and_misses(scan, clock);
             count_clutter(scan);
             begin_tracks(scan, clock);
             compare_sensors(scan);
-            if (record) write_updates(*record);
+            if (record) write_updates(*record, scan);
         }
         compare_overlaps();
         judge();
@@ -91,10 +97,11 @@ public:
         bool any = false;
         for (std::size_t i = 0; i < tracks.size(); ++i) {
             const double gap = unseen_for(i), real = tracks.real[i];
-            ends[i] = gap > c_.longest_gap_s || (real < c_.report && gap > c_.doubtful_gap_s) ||
+            ends[i] = !tracks.awaited[i] &&
+                      (gap > c_.longest_gap_s || (real < c_.report && gap > c_.doubtful_gap_s) ||
                       (real < c_.false_posterior && gap > c_.false_gap_s) ||
                       1.0 - tracks.presence[i * kPresences + kGone] < c_.least_presence ||
-                      (gap > c_.outside_gap_s && share_inside(i) < c_.outside_share);
+                      (gap > c_.outside_gap_s && share_inside(i) < c_.outside_share));
             kept[i] = !ends[i];
             if (!ends[i]) continue;
             any = true;
@@ -285,6 +292,7 @@ private:
         const association::ScanTerms terms(s_.sensors[k].leftovers, s_.width * s_.height, c_);
         const ByLeft index(boxes_);
         weigh_boxes(scan, index);
+        order_owners(scan);
         pairs_.clear();
         for (std::size_t i = 0; i < n; ++i) {
             may_be_interrupted();
@@ -297,20 +305,42 @@ private:
             const double real = std::max(tracks.real[i], association::kLeastPosterior);
             const double start = log_of(p / (1.0 - p)) - clutter, reach = association::reach(expected, 0, c_);
             const double above = association::reach(expected, 1, c_);
-            index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j) {
-                if (std::abs(boxes_[j].top - expected.box.top) > above) return;
+            const auto gain_of = [&](std::size_t j) {
                 const auto y = side_innovations(boxes_[j], expected.box);
                 const Edges cut = unmeasured(y, edges_[j]);
                 const double density =
                     association::sides_log_density(y, cut.any() ? with_cut(expected, cut, c_) : expected, terms, c_);
-                if (density <= association::kImpossible) return;
+                if (density <= association::kImpossible) return density;
                 const double of_track = association::score_likelihood(real, q_[j], c_);
-                const double gain = start + density + log_of(of_track / of_clutter_[j]);
+                return start + density + log_of(of_track / of_clutter_[j]);
+            };
+            if (tracks.given[i] >= 0) {
+                // Its box is given, however far off: that is no reason to doubt that it is real.
+                const std::size_t j = box_of(tracks.given[i]);
+                if (j < boxes_.size()) pairs_.push_back({i, j, std::max(gain_of(j), association::kLeastGain)});
+                continue;
+            }
+            index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j) {
+                if (std::abs(boxes_[j].top - expected.box.top) > above || is_owned(scan, j)) return;
+                const double gain = gain_of(j);
                 if (gain > 0.0) pairs_.push_back({i, j, gain});
             });
         }
         made_ = assignment_.solve(by_looks(scan), n, boxes_.size(), c_.exact_assignment);
     }
+
+    // The boxes of a scan by their owners, where these are given.
+    void order_owners(const Scan& scan) {
+        owned_.clear();
+        for (std::size_t j = 0; j < scan.owners.size(); ++j)
+            if (scan.owners[j] >= 0) owned_.push_back({scan.owners[j], j});
+        std::sort(owned_.begin(), owned_.end());
+    }
+    std::size_t box_of(std::int64_t owner) const {
+        const auto at = std::lower_bound(owned_.begin(), owned_.end(), std::pair{owner, std::size_t{0}});
+        return at == owned_.end() || at->first != owner ? boxes_.size() : at->second;
+    }
+    static bool is_owned(const Scan& scan, std::size_t j) { return !scan.owners.empty() && scan.owners[j] >= 0; }
 
     // Which boxes tell that their track is still there, by score and overlap with a better box of the scan.
     void weigh_boxes(const Scan& scan, const ByLeft& index) {
@@ -383,6 +413,12 @@ private:
         }
     }
 
+    // Of the tracks whose boxes are given, whether more are to come.
+    void await(const Scan& scan) {
+        if (scan.owners.empty()) return;
+        for (const std::size_t k : made_) s_.tracks.awaited[pairs_[k].row] = scan.awaited[pairs_[k].column];
+    }
+
     void count_hits_and_misses(const Scan& scan, const ScanClock& clock) {
         Tracks& tracks = s_.tracks;
         const std::size_t n = tracks.size(), S = s_.sensors.size(), k = scan.sensor;
@@ -450,6 +486,8 @@ private:
             initial_state(boxes_[j], edges_[j], rho2, exp_of(s_.log_scene_variance()), c_, tracks.mean_of(row), tracks.covariance_of(row));
             with_velocity(tracks.mean_of(row), s_.camera_velocity);
             tracks.track_id[row] = s_.next_id++;
+            tracks.given[row] = scan.owners.empty() ? -1 : scan.owners[j];
+            tracks.awaited[row] = !scan.owners.empty() && scan.awaited[j];
             tracks.used[row] = std::int64_t{1} << k;
             see_presence(tracks.presence.data() + row * kPresences);
             tracks.evidence.begin(row, clock.t, k, scan.logits[j], overlap, clock.weight);
@@ -566,7 +604,7 @@ private:
         smoothers::Entry* const entries = record.begin_scan(tracks.size(), sensor);
         for (std::size_t i = 0; i < tracks.size(); ++i) begin_entry(entries[i], i, static_cast<double>(ticks_) / 1e6);
     }
-    void write_updates(Record& record) {
+    void write_updates(Record& record, const Scan& scan) {
         Tracks& tracks = s_.tracks;
         const std::size_t before = record.tracks.back();
         smoothers::Entry* const entries = record.grow_scan(tracks.size());
@@ -576,6 +614,7 @@ private:
             std::copy_n(tracks.mean_of(i), kMean, entries[i].mean.begin());
             smoothers::halve(tracks.covariance_of(i), entries[i].covariance);
         }
+        for (std::size_t j = 0; j < scan.later.size(); ++j) entries[taken_by_[j]].later = scan.later[j];
     }
     void begin_entry(smoothers::Entry& entry, std::size_t row, double dt) {
         entry.t = s_.t;
@@ -618,6 +657,7 @@ private:
     std::vector<CameraChange> changes_;
     double step_s_ = 0.0;  // time of the last step (s)
     std::vector<Edges> edges_;  // of the scan's boxes
+    std::vector<std::pair<std::int64_t, std::size_t>> owned_;  // owners of the scan's boxes, in order
 };
 
 }  // namespace jeat::tracking

@@ -19,10 +19,11 @@ from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.frame_table import table_of_frame
 from jeat_graph.data.tables.reading import Reading
 
-#: Columns that a run's table must have, and those of classes and sizes, which not all have.
+#: Columns that a run's table must have, and those of classes, sizes and identities, which not all have.
 COLUMNS = ("t", "track_id", *BOX, "existence", *MEAN, *VAR, "sensors")
 RUN_CLASSES = ("class", "class_probability")
-MORE_COLUMNS = (*RUN_CLASSES, *SIZE_VAR)
+RUN_IDENTITIES = ("causal_id", "identity_probability")
+MORE_COLUMNS = (*RUN_CLASSES, *SIZE_VAR, *RUN_IDENTITIES)
 #: Columns of another tracker's result, or others that can stand for them, and those that it may have.
 RESULT_COLUMNS = ("t", "object_id", *BOX)
 MORE_RESULT_COLUMNS = ("score", *ASIDE)
@@ -154,7 +155,15 @@ def run_fields(table: FileTable) -> dict[str, Any]:
         "used": np.asarray(mask, dtype=np.int64)[index.reshape(-1)],
         "sensors": sensors,
         **_classes_of(table),
+        **_identities_of(table),
     }
+
+
+def _identities_of(table: FileTable) -> dict[str, Any]:
+    if not all(name in table for name in RUN_IDENTITIES):
+        return {}
+    causal, probability = RUN_IDENTITIES
+    return {causal: table.whole(causal), probability: table.number(probability)}
 
 
 def check_tracks(error: Callable[[int, str], DataError], fields: Mapping[str, Any]) -> None:

@@ -24,6 +24,7 @@ from jeat_graph.data.tables.trajectory_table import (
     NO_IDENTITIES,
     RESULT_COLUMNS,
     RUN_CLASSES,
+    RUN_IDENTITIES,
     bare_fields,
     check_tracks,
     is_result,
@@ -58,18 +59,19 @@ class TrajectoryWriter(PiecewiseWriter):
     Args:
         path: the file; `.parquet` and `.pq` are Parquet, all else is CSV.
         classes: whether it has the columns of classes; where it has not, those of the tables are left out.
+        identities: the same of those of identities that were decided again.
     """
 
-    def __init__(self, path: str | Path, *, classes: bool = False) -> None:
+    def __init__(self, path: str | Path, *, classes: bool = False, identities: bool = False) -> None:
         super().__init__()
-        self._classes = classes
+        self._classes, self._identities = classes, identities
         self._writer = TableWriter(path)
         self._pending: list[Trajectories] = []
         self._rows = 0
 
     def _begin(self) -> None:
         self._stack.enter_context(self._writer)
-        self._writer.append(table_columns(Trajectories.empty(), self._classes))
+        self._writer.append(table_columns(Trajectories.empty(), self._classes, self._identities))
 
     def _finish(self) -> None:
         self._flush()
@@ -93,16 +95,21 @@ class TrajectoryWriter(PiecewiseWriter):
     def _flush(self) -> None:
         """Convert what has come together: tables of a few rows each would cost far more one by one."""
         if self._pending:
-            self._writer.append(table_columns(Trajectories.concatenate(self._pending), self._classes))
+            self._writer.append(
+                table_columns(Trajectories.concatenate(self._pending), self._classes, self._identities)
+            )
         self._pending, self._rows = [], 0
 
 
-def table_columns(table: Trajectories, classes: bool | None = None) -> dict[str, Any]:
+def table_columns(
+    table: Trajectories, classes: bool | None = None, identities: bool | None = None
+) -> dict[str, Any]:
     """Return the columns of the contract (N,) by name, rounded as they are written.
 
     Args:
         table: the rows.
         classes: whether those of classes are among them; by default where the table has such.
+        identities: the same of those of identities that were decided again.
     """
     boxes, existence, mean, var, size_var = rounded(table)
     columns: dict[str, Any] = {"t": table.t + 0.0, "track_id": table.track_id}
@@ -117,6 +124,11 @@ def table_columns(table: Trajectories, classes: bool | None = None) -> dict[str,
             names, share = table.classes, table.class_probability
         columns |= dict(zip(RUN_CLASSES, (names, round_decimals(share, EXISTENCE_DECIMALS)), strict=True))
     columns |= {name: size_var[:, k] for k, name in enumerate(SIZE_VAR)}
+    if table.causal_id is not None if identities is None else identities:
+        causal, share = table.track_id, np.ones(len(table))
+        if table.causal_id is not None and table.identity_probability is not None:
+            causal, share = table.causal_id, table.identity_probability
+        columns |= dict(zip(RUN_IDENTITIES, (causal, round_decimals(share, EXISTENCE_DECIMALS)), strict=True))
     return columns
 
 
@@ -146,7 +158,8 @@ def write_trajectories(table: Trajectories, path: str | Path) -> None:
             "written_formats() of jeat_graph.io.formats.registry",
             path,
         )
-    with TrajectoryWriter(path, classes=table.classes is not None) as writer:
+    decided = table.causal_id is not None
+    with TrajectoryWriter(path, classes=table.classes is not None, identities=decided) as writer:
         writer.append(table)
 
 

@@ -88,6 +88,8 @@ def tracker_config(
         return replace(made, smoother=replace(made.smoother, engine="none"))
     if made.smoother.engine == "none":
         raise ConfigError("state.smoothed needs a smoother, but smoother.engine is none")
+    if made.smoother.identities == "whole":
+        raise ConfigError("smoother.identities: 'whole' needs the whole recording, which a service never has")
     return made
 
 

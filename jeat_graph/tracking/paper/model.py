@@ -70,6 +70,7 @@ class PaperModel(SmoothsRecords):
     has_fit = False
     weighs = False
     compares_looks = False
+    takes_owners = False
 
     def __init__(self, config: Config) -> None:
         super().__init__(histories_of(config, _EXISTENCE, _TOLD))
@@ -90,7 +91,13 @@ class PaperModel(SmoothsRecords):
         )
 
     def take(self, looked: StepInput) -> None:
-        """Take in the scans of one time."""
+        """Take in the scans of one time.
+
+        Raises:
+            JeatGraphError: who is who is given.
+        """
+        if looked.owners is not None:
+            raise lacking(self.name, "is not given who is who; tracker.engine=core is")
         now, t = self._now, looked.t
         dt = 0.0 if now.t is None else t - now.t
         done = step(now.tracks, t, dt, self._found(looked), now.next_id, self._settings)

@@ -1,0 +1,1 @@
+"""Who is who, decided once more when the future is known."""

@@ -1,0 +1,85 @@
+"""The smoothed table of a recording whose identities are decided with all of it in view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.detections import Detections
+from jeat_graph.data.identity_links import IdentityLinks
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.filters import box_sides, sensor_offsets
+from jeat_graph.smoothers.joining import LearntScene, MeasuredBoxes
+from jeat_graph.tracking.engine import lacking
+from jeat_graph.tracking.identities.deciding import IdentityDecision, Recording, decide
+from jeat_graph.tracking.identities.log import IdentityLog
+from jeat_graph.tracking.identities.passes import one_pass
+from jeat_graph.tracking.identities.retracking import retrack
+from jeat_graph.tracking.one_model import OneModel
+
+if TYPE_CHECKING:
+    from jeat_graph.tracking.model_tracker import ModelTracker
+
+
+def decided(tracker: ModelTracker, log: IdentityLog) -> tuple[IdentityLinks, Iterator[Trajectories]]:
+    """Decide who is who in what a tracker was given, and smooth along that.
+
+    Args:
+        tracker: that made the causal pass.
+        log: what it was given.
+
+    Returns:
+        What was joined, and the smoothed rows as they become final.
+    """
+    detections, causal = log.recording()
+    backward = one_pass(detections, tracker, tracker.constants, backward=True)
+    recording = _recording(tracker, detections)
+    decision = decide(recording, [causal, backward], backward, tracker.constants)
+    rows = retrack(detections, decision, backward.real, tracker)
+    return _links(decision, recording.measured.t), rows
+
+
+def _links(decision: IdentityDecision, t: FloatArray) -> IdentityLinks:
+    order = np.lexsort((decision.tail, t[decision.tail]))
+    tail, head = decision.tail[order], decision.head[order]
+    return IdentityLinks(
+        decision.owner[tail],
+        decision.causal[tail],
+        decision.causal[head],
+        t[tail],
+        t[head],
+        decision.log_ratio[order],
+        decision.joined[order],
+    )
+
+
+def _recording(tracker: ModelTracker, detections: Detections) -> Recording:
+    """Return what is known of detections at the end of the causal pass, in the model's own numbers."""
+    model, c = tracker._model, tracker.constants
+    if not isinstance(model, OneModel):
+        raise lacking(model.name, "does not say what it has learnt of the scene")
+    learnt, picture = model.learnt(), model.picture()
+    count = np.diff(detections.scan_start)
+    numbers = np.array([tracker._looked.index(name) for name in detections.sensors], dtype=np.int64)
+    sensor = numbers[np.repeat(detections.scan_sensor, count)]
+    boxes = np.concatenate(
+        [detections.boxes[:, :2], detections.boxes[:, :2] + detections.boxes[:, 2:]], axis=1
+    )
+    assert picture is not None, "the model has one"
+    ends = learnt.boxes_at_edge >= learnt.boxes_beyond
+    known = tracker.config.input.picture == "given"
+    edges = box_sides.at_edge(boxes, picture, c) & (ends & known)[sensor][:, None, None]
+    for k in range(len(numbers)):
+        own = sensor == k
+        boxes[own] = sensor_offsets.corrected(boxes[own], learnt.offsets[k])
+    scene = LearntScene(
+        learnt.process_noise,
+        learnt.log_side_variance,
+        learnt.log_scene_variance,
+        picture,
+    )
+    measured = MeasuredBoxes(np.repeat(detections.scan_t, count), sensor, boxes, edges)
+    return Recording(measured, np.unique(detections.scan_t), scene)

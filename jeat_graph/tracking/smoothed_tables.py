@@ -1,0 +1,88 @@
+"""What a tracker of the model smooths: the rows so far, those that are final, and all of them at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, cast
+
+from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.identity_links import IdentityLinks
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.smoothers.rows import ModelRows
+from jeat_graph.tracking.engine import TrackEngine
+from jeat_graph.tracking.identities.log import IdentityLog
+from jeat_graph.tracking.identities.whole import decided
+
+if TYPE_CHECKING:
+    from jeat_graph.tracking.model_tracker import ModelTracker
+
+
+class SmoothedTables:
+    """A tracker's smoothed tables; see `ModelTracker`."""
+
+    if TYPE_CHECKING:
+        sensor_names: tuple[str, ...]
+        _model: TrackEngine
+        _smooths: bool
+        _finished: bool
+        _log: IdentityLog | None
+        _links: IdentityLinks | None
+
+        def _smoothed_table(self, rows: ModelRows) -> Trajectories:
+            """Return rows of the smoother as a table."""
+
+    @property
+    def keeps_recording(self) -> bool:
+        """Whether it keeps all detections, to decide at the end who was who."""
+        return self._log is not None
+
+    def smoothed(self) -> Trajectories:
+        """Return the smoothed trajectories so far, without what was drained.
+
+        Raises:
+            JeatGraphError: the configuration asks for no smoother.
+        """
+        self._check_smooths()
+        if self._log is not None:
+            return Trajectories.concatenate(list(decided(self._tracker(), self._log)[1]))
+        return self._smoothed_table(self._model.smoothed())
+
+    def drain_smoothed(self) -> Trajectories:
+        """Return the smoothed rows that are final and forget them.
+
+        Raises:
+            JeatGraphError: the configuration asks for no smoother.
+        """
+        self._check_smooths()
+        if self._log is not None:  # nothing is final before the end
+            return Trajectories.empty(self.sensor_names)
+        return self._smoothed_table(self._model.drain())
+
+    def settle(self) -> None:
+        """Have the smoother be as one that was saved and loaded."""
+        self._model.settle()
+
+    def finish(self) -> Trajectories:
+        """End all tracks and return their smoothed trajectories; empty when called again."""
+        return Trajectories.concatenate([Trajectories.empty(self.sensor_names), *self.finish_in_pieces()])
+
+    def finish_in_pieces(self) -> Iterator[Trajectories]:
+        """Return what `finish` does, piece by piece, so that the rows need not all be in memory."""
+        done, self._finished = self._finished, True
+        if done:
+            return iter(())
+        if self._log is not None:
+            self._links, pieces = decided(self._tracker(), self._log)
+            return pieces
+        return iter((self._smoothed_table(self._model.finish()),) if self._smooths else ())
+
+    def identity_links(self) -> IdentityLinks | None:
+        """Return what the smoother joined, after `finish`; None where identities are causal."""
+        return self._links
+
+    def _check_smooths(self) -> None:
+        if not self._smooths and self._log is None:
+            raise JeatGraphError("the configuration asks for no smoother: smoother.engine is none")
+
+    def _tracker(self) -> ModelTracker:
+        return cast("ModelTracker", self)
