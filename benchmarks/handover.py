@@ -168,7 +168,7 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
             for row in result["real"]
         ]
         digits = {"F1": 3, "ECE": 3, "clock error ms": 0, "± ms": 0}
-        title = "Real cameras, 11 m apart, and a simulated way behind them"
+        title = "Real cameras, and a simulated way behind them"
         found["handover-real"] = Table.from_records(real, title=title, digits=digits)
     return found
 

@@ -1,7 +1,7 @@
 """Two real cameras that look at one stretch of road, their windows cut apart, as cameras of a corridor.
 
 In each session of BrnoCompSpeed `left` and `center` see the stretch between the laser gates. Of `left` only
-the first 30 % of the stretch are kept, of `center` the last 30 %: 11 m lie between.
+the first 30 % of the stretch are kept, of `center` the last 30 %: 11 m lie between if it is 28 m long.
 Both are calibrated from their measured lengths. A vehicle is known by the row of its laser gates, which
 both have; passages without one are left out. A longer gap is simulated behind the second window: each vehicle
 goes on at its true speed times 1 + s z, s = 0.04 (1 − exp(−gap / 400 m)) + 0.005, z standard normal.
@@ -22,10 +22,10 @@ from benchmarks.road_real import Gates, read_gates
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.road.speeds import ContactConfig
 
-#: Gaps (m): that of the windows, and the simulated ones.
-GAPS_M = (11.0, 200.0, 500.0, 1000.0)
-_STRETCH_M = 27.9
-_BEFORE_M, _AFTER_M = 8.4, 19.4
+#: Simulated gaps (m), that of the windows included.
+GAPS_M = (200.0, 500.0, 1000.0)
+#: Where the windows end and begin, as shares of the stretch between the gates.
+_BEFORE, _AFTER = 0.3, 0.7
 _KMH = 3.6
 _LANE_M = 3.4
 _LEAST_WAY_M = 2.0
@@ -45,6 +45,7 @@ class Window(NamedTuple):
         x: (N,) where across the road (m).
         gate: (N,) rows of the laser gates.
         gates: the gates.
+        stretch_m: from the first to the last of them.
     """
 
     t: FloatArray
@@ -53,6 +54,7 @@ class Window(NamedTuple):
     x: FloatArray
     gate: IntArray
     gates: Gates
+    stretch_m: float
 
 
 def judge_sessions(root: Path) -> list[dict[str, Any]]:
@@ -75,13 +77,14 @@ def judge_session(left: Path, center: Path) -> list[dict[str, Any]]:
     first = passages_of(before, before.t, "left")
     who = np.array([same.get(int(k), -2) for k in before.gate])
     out = []
-    for distance in GAPS_M:
+    between = (_AFTER - _BEFORE) * before.stretch_m
+    for distance in (between, *GAPS_M):
         t = after.t
-        if distance > GAPS_M[0]:
+        if distance > between:
             spread = 0.04 * (1.0 - np.exp(-distance / 400.0)) + 0.005
             noise = np.random.default_rng(int(distance)).normal(size=len(t))
             speed = after.gates.kmh[after.gate] / _KMH * (1.0 + spread * noise)
-            t = t + (distance - GAPS_M[0]) / speed
+            t = t + (distance - between) / speed
         second = passages_of(after, t, "center")
         known = KnownGap("left", "center", distance, 0.01 * distance)
         over = solve(known, Gap.of(first, second))
@@ -113,12 +116,15 @@ def window(folder: Path, before: bool) -> Window:
     camera = calibrate(Problem(*size, lengths, None, tracks, config)).camera
     contact = ContactConfig()
     road = camera.to_road(points.pixels, contact.height_m)
-    far, near = sorted((_line_at(points, road, line) for line in about["lines"]), reverse=True)
-    scale = _STRETCH_M / (far - near)
+    lines = [_line_at(points, road, line) for line in about["lines"]]
+    far, near = max(lines), min(lines)
+    gates = read_gates(folder / "speeds.csv")
+    stretch = float(np.median(gates.kmh / _KMH * (gates.times[:, 1] - gates.times[:, 0])))
+    scale = stretch / (far - near)
     along = (far - road[:, 1]) * scale
-    keep = along < _BEFORE_M if before else along > _AFTER_M
+    end = (_BEFORE if before else _AFTER) * stretch
+    keep = along < end if before else along > end
     part = PointTable(points.t[keep], points.track_id[keep], points.pixels[keep])
-    end = _BEFORE_M if before else _AFTER_M
     rows = []
     for vehicle in follow_points(part, camera, MotionFitConfig(), contact)[0]:
         place = vehicle.fit.at(vehicle.t)
@@ -132,12 +138,11 @@ def window(folder: Path, before: bool) -> Window:
             t = float(vehicle.t[k]) + (end - way[k]) / (here.kmh / _KMH)
             rows.append((t, mean.kmh, mean.noise_kmh, float(np.median(place[:, 0]))))
     t, kmh, sigma, x = np.array(rows).T
-    gates = read_gates(folder / "speeds.csv")
     which = 0 if before else 1
-    to_gate = (0.0 if before else _STRETCH_M) - end
+    to_gate = (0.0 if before else stretch) - end
     gate = _gates_of(t + to_gate / (kmh / _KMH), kmh, gates.times[:, which], gates.kmh)
     known = gate >= 0
-    return Window(t[known], kmh[known], sigma[known], x[known], gate[known], gates)
+    return Window(t[known], kmh[known], sigma[known], x[known], gate[known], gates, stretch)
 
 
 def _line_at(points: Any, road: FloatArray, line: list[float]) -> float:
