@@ -8,6 +8,7 @@ import numpy as np
 
 from jeat_graph.data.notes import note
 from jeat_graph.data.trajectories import GroundTruth
+from jeat_graph.eval.pairing import RELATIVE_BOX
 
 # So far from a box, in its own sizes, may an object's centre lie: the picture's edge cuts boxes.
 _BESIDE = 0.5
@@ -25,8 +26,8 @@ def motion_in_picture(truth: GroundTruth, title: str) -> GroundTruth:
         truth: the truth.
         title: what it is called in the note.
     """
-    if truth.motion is None:
-        return truth
+    if truth.motion is None or float(np.abs(truth.boxes).max(initial=0.0)) <= RELATIVE_BOX:
+        return truth  # boxes in units of the picture's size are refused later
     place = truth.motion[:, :2]
     known = np.isfinite(place).all(axis=1) & ~truth.ignore
     if not known.any():

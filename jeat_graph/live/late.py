@@ -191,7 +191,7 @@ class LiveTracker(OneAtATime):
             news.taken_off[step.sensor] = found
             news.lines.append(
                 f"warning: sensor {step.sensor!r}: its clock has leapt by {step.step_s:+.3f} s while the "
-                f"others went on; which is taken off, {self._clocks.lag_s(step.sensor):.4f} s in all "
+                f"others went on; that is taken off, {self._clocks.lag_s(step.sensor):.4f} s in all "
                 "(--set input.clocks=as_given leaves them)"
             )
         return news

@@ -11,7 +11,7 @@ from jeat_graph.cli.main import main
     ("command", "words"),
     [
         (("export", "run", "--to", "coco", "--track", "1"), "--track is for --to tum, not coco"),
-        (("export", "run", "--to", "rvt", "--only", "causal"), "--only is for --to cvat or coco"),
+        (("export", "run", "--to", "rvt", "--only", "causal"), "--only is for --to coco or cvat"),
         (("export", "run", "--to", "cvat", "--start", "0"), "--start is for --to ottrk, not cvat"),
         (("detect", "--frames", "a.mp4", "--detector-events", "sehn"), "--detector-events says nothing with"),
         (("detect", "--events", "a.raw", "--detector-frames", "sehn"), "nothing without --frames"),

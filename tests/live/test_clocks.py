@@ -243,7 +243,7 @@ def test_one_comparison_alone_is_not_believed(monkeypatch):
 
     lags = iter([0.5, 1.5, 2.5, 2.501])
 
-    def compare(*_):
+    def compare(*_, **__):
         yield
         return ClockComparison(False, FoundClock(next(lags), 1e-3, True), "")
 

@@ -260,7 +260,8 @@ silent_s: 2
         wait_for(
             lambda: service.problem("sensor 'rgb': no scan for"), "the silent sensor is told of", service
         )
-        assert service.problem(f"127.0.0.1:{camera.port}/video: not connected")
+        assert service.problem(f"127.0.0.1:{camera.port}/video")
+        assert service.problem("/video): not connected")
         assert service.metric("jeat_graph_ready") == {"": 0.0}
         wait_for(
             lambda: service.said("sensor 'rgb': no scan for"), "the log names the silent sensor", service
