@@ -7,8 +7,6 @@ ignored before they count is the business of `eval.protocols`.
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -17,6 +15,7 @@ from typing import Any
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import progress_span, with_progress
+from jeat_graph.data.records import records_in
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.frames import Frames, Kind, build_frames
 from jeat_graph.eval.overlapping import OverlappingPairs, overlapping_pairs
@@ -29,10 +28,7 @@ _PACKAGE = "jeat_graph.eval.scores"
 @cache
 def metrics() -> tuple[Metric[Any], ...]:
     """Return the records of all metrics, by name."""
-    package = importlib.import_module(_PACKAGE)
-    names = [one.name for one in pkgutil.iter_modules(package.__path__)]
-    modules = [importlib.import_module(f"{_PACKAGE}.{name}") for name in names]
-    found: list[Metric[Any]] = [module.METRIC for module in modules if hasattr(module, "METRIC")]
+    found: list[Metric[Any]] = records_in(_PACKAGE, "METRIC")
     return tuple(sorted(found, key=lambda one: one.name))
 
 

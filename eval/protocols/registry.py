@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from functools import cache
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.records import records_in
 from jeat_graph.eval.protocols.record import JudgingProtocol
 
 _PACKAGE = "jeat_graph.eval.protocols"
@@ -15,10 +14,7 @@ _PACKAGE = "jeat_graph.eval.protocols"
 @cache
 def protocols() -> tuple[JudgingProtocol, ...]:
     """Return the records of all protocols, by name."""
-    package = importlib.import_module(_PACKAGE)
-    names = [one.name for one in pkgutil.iter_modules(package.__path__)]
-    modules = [importlib.import_module(f"{_PACKAGE}.{name}") for name in names]
-    found: list[JudgingProtocol] = [module.PROTOCOL for module in modules if hasattr(module, "PROTOCOL")]
+    found: list[JudgingProtocol] = records_in(_PACKAGE, "PROTOCOL")
     return tuple(sorted(found, key=lambda one: one.name))
 
 

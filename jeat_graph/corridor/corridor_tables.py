@@ -16,10 +16,10 @@ from jeat_graph.corridor.handover import Handover, identities_of
 from jeat_graph.corridor.passages import Passages
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.io.tables.rounding import round_decimals
+from jeat_graph.road.speeds import KMH
 
 Columns = dict[str, npt.NDArray[Any]]
 _Z95 = 1.959964
-_KMH = 3.6
 _DECIMALS = 3
 #: A vehicle whose likeliest partner is at least this probable is left out for doubt, not for want of one.
 _DOUBT = 0.1
@@ -96,7 +96,7 @@ def passage_columns(corridor: Corridor) -> Columns:
             "travel_time_s": round_decimals(travel, _DECIMALS),
             "low_s": round_decimals(travel - _Z95 * own, _DECIMALS),
             "high_s": round_decimals(travel + _Z95 * own, _DECIMALS),
-            "speed_kmh": round_decimals(_KMH * p.distance_m / travel, _DECIMALS),
+            "speed_kmh": round_decimals(KMH * p.distance_m / travel, _DECIMALS),
             "from_lane": _names(a.lanes, a.lane[i]),
             "to_lane": _names(b.lanes, b.lane[j]),
             "class": _kinds(over),

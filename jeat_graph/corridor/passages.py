@@ -15,8 +15,8 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.io.tables.file_tables import read_table
+from jeat_graph.road.speeds import KMH
 
-_KMH = 3.6
 _TWO_SIDED_95 = 1.959964
 #: Of a crossing whose table does not state it: about the time between two pictures.
 _USUAL_SIGMA_S = 0.03
@@ -110,7 +110,7 @@ def read_passages(
     track_id, t, kmh, low, high, sigma_t, lane = (
         values[order] for values in (track_id, t, kmh, low, high, sigma_t, lane)
     )
-    slow = ~(kmh / _KMH > _LEAST_SPEED)
+    slow = ~(kmh / KMH > _LEAST_SPEED)
     left_out = [
         (int(k), f"its speed at the line {line!r} is not known, or it stands") for k in track_id[slow]
     ]
@@ -125,7 +125,7 @@ def read_passages(
     lanes, lane_code = _codes(lane[keep])
     kinds, kind = _codes(kind_names[keep])
     return Passages(
-        camera, line, track_id[keep], t[keep], sigma_t[keep], np.log(kmh[keep] / _KMH), sigma_speed[keep],
+        camera, line, track_id[keep], t[keep], sigma_t[keep], np.log(kmh[keep] / KMH), sigma_speed[keep],
         lane_code, log_length[keep], sigma_length[keep], kind, lanes, kinds,
         (min(span_s[0], t.min(initial=np.inf)), max(span_s[1], t.max(initial=-np.inf))), tuple(left_out),
     )  # fmt: skip

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from functools import cache
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.records import records_in
 from jeat_graph.exporting.record import SOME_TAKE, ExportRequest, ExportTarget
 
 _PACKAGE = "jeat_graph.exporting"
@@ -15,10 +14,7 @@ _PACKAGE = "jeat_graph.exporting"
 @cache
 def exports() -> tuple[ExportTarget, ...]:
     """Return the records of all exports, by name."""
-    package = importlib.import_module(_PACKAGE)
-    names = [one.name for one in pkgutil.iter_modules(package.__path__)]
-    modules = [importlib.import_module(f"{_PACKAGE}.{name}") for name in names]
-    found: list[ExportTarget] = [module.EXPORT for module in modules if hasattr(module, "EXPORT")]
+    found: list[ExportTarget] = records_in(_PACKAGE, "EXPORT")
     return tuple(sorted(found, key=lambda one: one.name))
 
 

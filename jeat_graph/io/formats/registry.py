@@ -5,13 +5,12 @@ A format is a module of this package with a record `FORMAT`; this is the only pl
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.records import records_in
 from jeat_graph.io.files.limits import check_file
 from jeat_graph.io.files.not_tables import XML
 from jeat_graph.io.formats.record import HEAD_BYTES, BoxFormat, Certainty, FileHead
@@ -23,11 +22,7 @@ _PACKAGE = "jeat_graph.io.formats"
 @cache
 def formats() -> tuple[BoxFormat, ...]:
     """Return the records of all formats: tables with a header first, then by name."""
-    package = importlib.import_module(_PACKAGE)
-    modules = [
-        importlib.import_module(f"{_PACKAGE}.{one.name}") for one in pkgutil.iter_modules(package.__path__)
-    ]
-    found: list[BoxFormat] = [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
+    found: list[BoxFormat] = records_in(_PACKAGE, "FORMAT")
     return tuple(sorted(found, key=lambda one: (not one.is_table, one.name)))
 
 

@@ -7,14 +7,13 @@ where the user asks for it.
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.records import records_in
 from jeat_graph.detection.models import layouts
 from jeat_graph.detection.models.layouts.record import DecodedBoxes, Fit, Network, OutputLayout, Outputs
 from jeat_graph.detection.models.onnx_head import Port
@@ -25,9 +24,7 @@ _RECORDS = "LAYOUTS"
 @cache
 def all_layouts() -> dict[str, OutputLayout]:
     """Return all layouts by name, in the order of their files' names."""
-    names = sorted(found.name for found in pkgutil.iter_modules(layouts.__path__))
-    modules = [importlib.import_module(f"{layouts.__name__}.{name}") for name in names]
-    records = [record for module in modules for record in getattr(module, _RECORDS, ())]
+    records = [record for of_file in records_in(layouts.__name__, _RECORDS) for record in of_file]
     return {record.name: record for record in records}
 
 
