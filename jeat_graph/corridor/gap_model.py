@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.special import ndtr
@@ -110,6 +111,18 @@ class Gap:
     def of(cls, before: Passages, after: Passages) -> Gap:
         """Put two cameras together."""
         return cls(before, after, traffic_speed(before), traffic_speed(after))
+
+    @cached_property
+    def length_density(self) -> FloatArray | None:
+        """Kernel density (B,) of ln length at B, each at its own; NaN where unknown. None if none tells."""
+        lengths = self.after.log_length
+        known = np.isfinite(lengths)
+        if not known.any() or np.ptp(lengths[known]) < 1e-6:
+            return None
+        out = np.full(len(lengths), np.nan)
+        density = gaussian_kde(lengths[known])(lengths[known])
+        out[known] = np.maximum(density, _LEAST_DENSITY * density.max())
+        return out
 
     @property
     def own_before(self) -> FloatArray:
@@ -237,19 +250,15 @@ def _speed_ratio(gap: Gap, pairs: PassagePairs, p: GapParameters) -> FloatArray:
 def _length_ratio(gap: Gap, pairs: PassagePairs, p: GapParameters) -> FloatArray:
     """Return ln p(length_j | length_i) / p(length_j), 0 where unknown; p(length_j) is a kernel density."""
     i, j = pairs.i, pairs.j
-    lengths = gap.after.log_length
-    known = np.isfinite(lengths)
+    lengths, apart = gap.after.log_length, gap.length_density
     out = np.zeros(len(pairs))
-    both = np.isfinite(gap.before.log_length[i]) & known[j]
-    if not both.any() or np.ptp(lengths[known]) < 1e-6:
+    both = np.isfinite(gap.before.log_length[i]) & np.isfinite(lengths[j])
+    if apart is None or not both.any():
         return out
-    apart = np.zeros(len(lengths))
-    apart[known] = gaussian_kde(lengths[known])(lengths[known])
-    apart = np.maximum(apart, _LEAST_DENSITY * apart.max())
     i, j = i[both], j[both]
     error = gap.before.sigma_length[i] ** 2 + gap.after.sigma_length[j] ** 2
     joined = _log_normal(lengths[j] - gap.before.log_length[i] - p.length_shift, p.length_spread**2 + error)
-    floor = math.log(_LEAST_DENSITY) + np.log(apart.max())
+    floor = math.log(_LEAST_DENSITY) + np.log(np.nanmax(apart))
     out[both] = np.logaddexp(joined, floor) - np.log(apart[j])
     return out
 
