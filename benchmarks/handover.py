@@ -21,6 +21,7 @@ from benchmarks.processes import in_processes
 from benchmarks.provenance import provenance
 from jeat_graph.config.argument_types import counting, natural
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.normal import Z95
 
 if TYPE_CHECKING:
     from jeat_graph.corridor.passages import Passages
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 SCENES = ((1200.0, 31.0, 500.0), (2400.0, 31.0, 500.0), (4800.0, 24.0, 200.0), (2400.0, 31.0, 1000.0))
 _DURATION_S = 900.0
 _RAMPS = 0.04
-_Z95 = 1.96
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -90,7 +90,7 @@ def judge_road(job: tuple[tuple[float, float, float], int]) -> dict[str, Any]:
         out |= {"solved": True, **pair_scores(over, _vehicles(a, first), _vehicles(b, second))}
         error = over.fitted.parameters.offset_s - clocks[1]
         out["offset_error_s"] = error
-        out["offset_held"] = bool(abs(error) <= _Z95 * over.fitted.covariance[0, 0] ** 0.5)
+        out["offset_held"] = bool(abs(error) <= Z95 * over.fitted.covariance[0, 0] ** 0.5)
         corridor = Corridor.of(("A", "B"), {"A": first, "B": second}, [over])
         out["travel_times"] = travel_time_errors(corridor, driven.t[:, 0], driven.t[:, 1])
     try:

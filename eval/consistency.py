@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.normal import Z95
 from jeat_graph.data.progress import with_progress
 from jeat_graph.eval.lagged import States, states_at
 from jeat_graph.eval.tables import Cell, Table
@@ -37,7 +38,7 @@ def consistency(tracks: Sequence[FilteredTrack]) -> tuple[dict[str, Any], Table]
     nis = (np.concatenate(innovations) ** 2).sum(axis=1) if innovations else np.zeros(0)
     low, high = chi2_bounds(len(nis), 2)
     white = whiteness(innovations)
-    bound = 1.96 / np.sqrt(max(2 * len(nis), 1))
+    bound = Z95 / np.sqrt(max(2 * len(nis), 1))
     square = np.concatenate(ratio) if ratio else np.zeros((0, 3))
     values: dict[str, Any] = {
         "innovations": len(nis),

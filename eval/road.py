@@ -11,13 +11,13 @@ import numpy as np
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.normal import Z95
 from jeat_graph.io.tables.file_tables import read_table
 
 _TRUE = ("x", "y", "speed_kmh")
 _ESTIMATED = (*_TRUE, "var_x", "var_y", "var_speed_kmh")
 #: Of a row of a table of tracks that may be blank: a speed that is not known yet.
 _SPEED = ("speed_kmh", "var_speed_kmh")
-_Z95 = 1.959963984540054
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def _read(path: str | Path, identity: str, columns: tuple[str, ...], blank: tupl
 
 def share_held(error: FloatArray, var: FloatArray) -> FloatArray:
     """Per cent of errors (N, ...) within the 95 % intervals of normal errors of these variances (...)."""
-    return np.asarray(100.0 * (np.abs(error) <= _Z95 * np.sqrt(var)).mean(axis=0), dtype=np.float64)
+    return np.asarray(100.0 * (np.abs(error) <= Z95 * np.sqrt(var)).mean(axis=0), dtype=np.float64)
 
 
 class Matched(NamedTuple):

@@ -15,11 +15,11 @@ from jeat_graph.corridor.gap_model import within
 from jeat_graph.corridor.handover import Handover, identities_of
 from jeat_graph.corridor.passages import Passages
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.normal import Z95
 from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.road.speeds import KMH
 
 Columns = dict[str, npt.NDArray[Any]]
-_Z95 = 1.959964
 _DECIMALS = 3
 #: A vehicle whose likeliest partner is at least this probable is left out for doubt, not for want of one.
 _DOUBT = 0.1
@@ -94,8 +94,8 @@ def passage_columns(corridor: Corridor) -> Columns:
             "t_from": round_decimals(a.t[i] - shift, 4),
             "t_to": round_decimals(b.t[j] - shift - p.offset_s, 4),
             "travel_time_s": round_decimals(travel, _DECIMALS),
-            "low_s": round_decimals(travel - _Z95 * own, _DECIMALS),
-            "high_s": round_decimals(travel + _Z95 * own, _DECIMALS),
+            "low_s": round_decimals(travel - Z95 * own, _DECIMALS),
+            "high_s": round_decimals(travel + Z95 * own, _DECIMALS),
             "speed_kmh": round_decimals(KMH * p.distance_m / travel, _DECIMALS),
             "from_lane": _names(a.lanes, a.lane[i]),
             "to_lane": _names(b.lanes, b.lane[j]),
@@ -187,7 +187,7 @@ def mean_travel_time(
     unseen = max(1.0 - weight / max(expected, weight), 0.0)
     doubt = float((probability * (1.0 - probability)).sum()) / weight
     sd = math.sqrt(spread / len(travel) * (unseen + 2.0 * doubt) + clock_variance)
-    return (expected, mean, mean - _Z95 * sd, mean + _Z95 * sd, float(np.median(travel)))
+    return (expected, mean, mean - Z95 * sd, mean + Z95 * sd, float(np.median(travel)))
 
 
 def od_columns(corridor: Corridor, interval_s: float, begin_s: float = 0.0) -> Columns:
@@ -210,7 +210,7 @@ def od_columns(corridor: Corridor, interval_s: float, begin_s: float = 0.0) -> C
         for first, name in enumerate(corridor.order):
             for last, events in _ends(corridor, first, slots[name] == slot):
                 mean, variance = float(events.sum()), float((events * (1.0 - events)).sum())
-                half = _Z95 * math.sqrt(variance)
+                half = Z95 * math.sqrt(variance)
                 key = (slot, name, corridor.order[last])
                 if mean > 0.5 or key in counted:
                     span = (slot * interval_s, (slot + 1) * interval_s)

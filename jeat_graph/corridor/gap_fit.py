@@ -15,13 +15,12 @@ from jeat_graph.association.matching_marginals import MatchingMarginals, matchin
 from jeat_graph.corridor.gap_model import (
     Gap,
     GapParameters,
+    PairTimes,
     PassagePairs,
     candidate_pairs,
     log_ratios,
-    residual,
-    residual_variance,
+    pair_times,
     table_of,
-    time_log_densities,
     within,
 )
 from jeat_graph.corridor.shared_slowness import Slowness, by_lane, pooled
@@ -100,14 +99,15 @@ def fit_gap(gap: Gap, prior: Prior, offset_s: float, rounds: int = _ROUNDS) -> F
     covariance = np.zeros((2, 2))
     for _ in range(rounds):
         pairs = candidate_pairs(gap, p, slowness)
-        ratio = log_ratios(gap, pairs, p, slowness)
+        times = pair_times(gap, pairs, p, slowness)
+        ratio = log_ratios(gap, pairs, p, slowness, times)
         marginals = matching_marginals(pairs.i, pairs.j, ratio, a, b)
         old = p
-        p, slowness, shared, covariance = _improved(gap, pairs, marginals.pair, p, slowness, prior)
+        p, slowness, shared, covariance = _improved(gap, pairs, marginals.pair, p, slowness, times, prior)
         if _change(old, p) < _TOLERANCE:
             break
     pairs = candidate_pairs(gap, p, slowness)
-    ratio = log_ratios(gap, pairs, p, slowness)
+    ratio = log_ratios(gap, pairs, p, slowness, pair_times(gap, pairs, p, slowness))
     marginals = matching_marginals(pairs.i, pairs.j, ratio, a, b)
     return FittedGap(gap, p, slowness, shared, pairs, marginals, ratio, covariance)
 
@@ -128,31 +128,34 @@ def _improved(
     probability: FloatArray,
     p: GapParameters,
     slowness: FloatArray,
+    times: PairTimes,
     prior: Prior,
 ) -> tuple[GapParameters, FloatArray, Slowness, FloatArray]:
     """Return the next parameters, the slowness of each passage, what is shared of it, and the covariance."""
-    inlier, outlier = time_log_densities(gap, pairs, p, slowness)
-    share = probability / (1.0 + np.exp(np.clip(outlier - inlier, -50.0, 50.0)))
+    share = probability / (1.0 + np.exp(np.clip(times.outlier - times.inlier, -50.0, 50.0)))
     total = float(probability.sum())
-    p, mean_slowness, covariance = _clock_and_weights(gap, pairs, share, p, slowness, prior)
+    p, mean_slowness, covariance = _clock_and_weights(gap, pairs, share, p, slowness, times, prior)
     level = np.full(len(gap.before), mean_slowness)
-    e = residual(gap, pairs, p, level)
-    variance = residual_variance(gap, pairs, p)
-    value, noise = pooled(pairs.i, e, variance, share, len(gap.before))
+    times = pair_times(gap, pairs, p, level)
+    value, noise = pooled(pairs.i, times.error, times.variance, share, len(gap.before))
     varying, shared = by_lane(gap.before.t, gap.before.lane, value, noise)
     slowness = level + varying
-    e = residual(gap, pairs, p, slowness)
-    other = residual_variance(gap, pairs, replace(p, spread=0.0))
     p = replace(
         p,
-        spread=_spread(e, other, share, p.spread),
+        spread=_spread(times.error - varying[pairs.i], times.variance - p.spread**2, share, p.spread),
         outliers=_beta(float((probability - share).sum()), total, _OUTLIERS, _BOUNDS_OUTLIERS),
     )
     return _features(gap, pairs, probability, p, slowness), slowness, shared, covariance
 
 
 def _clock_and_weights(
-    gap: Gap, pairs: PassagePairs, share: FloatArray, p: GapParameters, slowness: FloatArray, prior: Prior
+    gap: Gap,
+    pairs: PassagePairs,
+    share: FloatArray,
+    p: GapParameters,
+    slowness: FloatArray,
+    times: PairTimes,
+    prior: Prior,
 ) -> tuple[GapParameters, float, FloatArray]:
     """Weighed least squares in the offset, the distance, the weights of the speeds, and the mean slowness.
 
@@ -161,8 +164,7 @@ def _clock_and_weights(
     """
     i, j = pairs.i, pairs.j
     mean = float(np.average(slowness, weights=np.bincount(i, share, len(slowness)) + 1e-9))
-    travel = gap.after.t[j] - gap.before.t[i] - p.offset_s
-    e = residual(gap, pairs, p, slowness)
+    travel, e = times.travel, times.error
     # The same for all: that fast vehicles arrive earlier by less than their speeds say is mostly the error of
     # these speeds, and would pass for an offset.
     level = np.full(len(e), -float(np.average(1.0 / travel, weights=share + 1e-12)) if len(e) else 0.0)
@@ -170,7 +172,7 @@ def _clock_and_weights(
         [level, np.full(len(e), -1.0 / p.distance_m), gap.own_before[i], gap.own_after[j], -np.ones(len(e))],
         axis=1,
     )
-    weight = share / residual_variance(gap, pairs, p)
+    weight = share / times.variance
     precision = np.array(
         [prior.offset_sd_s**-2, prior.distance_sd_m**-2, _WEIGHT_SD**-2, _WEIGHT_SD**-2, SLOWNESS_SD**-2]
     )

@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtr
@@ -175,7 +176,8 @@ def candidate_pairs(gap: Gap, p: GapParameters, slowness: FloatArray, margin_s: 
     pairs = PassagePairs(i, j)
     travel = gap.after.t[j] - start[i]
     near = travel > 0.0
-    near[near] = np.abs(residual(gap, PassagePairs(i[near], j[near]), p, slowness)) < WINDOW
+    expected = expected_log_time(gap, PassagePairs(i[near], j[near]), p, slowness)
+    near[near] = np.abs(np.log(travel[near]) - expected) < WINDOW
     return PassagePairs(pairs.i[near], pairs.j[near])
 
 
@@ -191,42 +193,54 @@ def expected_log_time(gap: Gap, pairs: PassagePairs, p: GapParameters, slowness:
     )
 
 
-def residual(gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray) -> FloatArray:
-    """Return e (E,): ln of the travel time less what is expected. Travel times are positive."""
-    travel = gap.after.t[pairs.j] - gap.before.t[pairs.i] - p.offset_s
-    return np.asarray(np.log(travel) - expected_log_time(gap, pairs, p, slowness))
-
-
-def residual_variance(gap: Gap, pairs: PassagePairs, p: GapParameters) -> FloatArray:
+def _residual_variance(gap: Gap, pairs: PassagePairs, p: GapParameters, travel: FloatArray) -> FloatArray:
     """Return the variance (E,) of e of no outlier: s² and what the errors of times and speeds add."""
     i, j = pairs.i, pairs.j
-    travel = gap.after.t[j] - gap.before.t[i] - p.offset_s
     times = (gap.before.sigma_t[i] ** 2 + gap.after.sigma_t[j] ** 2) / travel**2
     speeds = (p.weights[0] * gap.before.sigma_speed[i]) ** 2 + (p.weights[1] * gap.after.sigma_speed[j]) ** 2
     return np.asarray(p.spread**2 + times + speeds)
 
 
-def log_ratios(gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray) -> FloatArray:
-    """Return the log ratio (E,) of "one vehicle" to "both alone" of each pair."""
+class PairTimes(NamedTuple):
+    """What the times of E pairs say.
+
+    Attributes:
+        travel: (E,) travel times (s).
+        error: (E,) e.
+        variance: (E,) of e of no outlier.
+        inlier: (E,) ln of that part of the density of e that goes with the traffic.
+        outlier: (E,) ln of the other part.
+    """
+
+    travel: FloatArray
+    error: FloatArray
+    variance: FloatArray
+    inlier: FloatArray
+    outlier: FloatArray
+
+
+def pair_times(gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray) -> PairTimes:
+    """Return travel times, residuals and both parts of their density; travel times are positive."""
+    travel = gap.after.t[pairs.j] - gap.before.t[pairs.i] - p.offset_s
+    error = np.asarray(np.log(travel) - expected_log_time(gap, pairs, p, slowness))
+    variance = _residual_variance(gap, pairs, p, travel)
+    inlier = _log_normal(error, variance) + math.log1p(-p.outliers)
+    outlier = _log_normal(error, np.full(len(error), OUTLIER_SD**2)) + math.log(p.outliers)
+    return PairTimes(travel, error, variance, inlier, outlier)
+
+
+def log_ratios(
+    gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray, times: PairTimes
+) -> FloatArray:
+    """Return the log ratio (E,) of "one vehicle" to "both alone" of each pair; `times` are of the same."""
     i, j = pairs.i, pairs.j
-    travel = gap.after.t[j] - gap.before.t[i] - p.offset_s
-    inlier, outlier = time_log_densities(gap, pairs, p, slowness)
     reach = p.matched * within(gap, p, slowness)[i]
-    out = np.logaddexp(inlier, outlier) - np.log(travel)
+    out = np.logaddexp(times.inlier, times.outlier) - np.log(times.travel)
     out += np.log(reach) - np.log1p(-reach) - math.log(p.rate)
     out += _speed_ratio(gap, pairs, p) + _length_ratio(gap, pairs, p)
     out += _table_ratio(gap.before.lane[i], gap.after.lane[j], p.lanes)
     out += _table_ratio(gap.before.kind[i], gap.after.kind[j], p.kinds)
     return np.asarray(out)
-
-
-def time_log_densities(
-    gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return ln of both parts (E,) of the density of e: what goes with the traffic, and outliers."""
-    e = residual(gap, pairs, p, slowness)
-    inlier = _log_normal(e, residual_variance(gap, pairs, p)) + math.log1p(-p.outliers)
-    return inlier, _log_normal(e, np.full(len(e), OUTLIER_SD**2)) + math.log(p.outliers)
 
 
 def within(gap: Gap, p: GapParameters, slowness: FloatArray) -> FloatArray:

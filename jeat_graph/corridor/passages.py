@@ -13,11 +13,11 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.normal import Z95
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.io.tables.file_tables import read_table
 from jeat_graph.road.speeds import KMH
 
-_TWO_SIDED_95 = 1.959964
 #: Of a crossing whose table does not state it: about the time between two pictures.
 _USUAL_SIGMA_S = 0.03
 #: Of the ln of a speed without an interval, and of the ln of a length without a variance.
@@ -117,7 +117,7 @@ def read_passages(
     track_id, t, kmh, low, high, sigma_t, lane = (
         values[~slow] for values in (track_id, t, kmh, low, high, sigma_t, lane)
     )
-    sigma_speed = np.where(np.isfinite(high - low), (high - low) / (2.0 * _TWO_SIDED_95 * kmh), np.nan)
+    sigma_speed = np.where(np.isfinite(high - low), (high - low) / (2.0 * Z95 * kmh), np.nan)
     sigma_speed = np.where(np.isfinite(sigma_speed), sigma_speed, _USUAL_SIGMA_SPEED)
     keep, doubled = _without_fragments(track_id, t, kmh, lane, sigma_speed)
     left_out += doubled

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from jeat_graph.data.normal import Z95
 from jeat_graph.road.calibrate import CameraCalibration
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.length_evidence import length_errors
-from jeat_graph.road.speeds import Z95
 
 _ROWS = (0.25, 0.5, 0.75, 0.95)  # of the picture's height
 _STEP_S = 0.5

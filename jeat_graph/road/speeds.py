@@ -10,6 +10,7 @@ import numpy as np
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.normal import Z95
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.evidence import within
 from jeat_graph.road.key_motion import RoadMotion
@@ -17,7 +18,6 @@ from jeat_graph.road.motion_fit import MotionFitConfig, fit_motion, thinned
 from jeat_graph.road.stuck import vehicles_part
 
 KMH = 3.6
-Z95 = 1.959963984540054
 _LEAST_POINTS = 3
 _FEW = 12
 _LIFT_M = 0.01

@@ -12,11 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.config.fields import LARGEST, check, number
+from jeat_graph.data.normal import Z95
 from jeat_graph.eval.counting import interval_edges, observed_s, per_hour
 from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.road.crossings import Crossing
 from jeat_graph.road.results import RoadResult
-from jeat_graph.road.speeds import KMH, Z95
+from jeat_graph.road.speeds import KMH
 
 ALL = "all"
 

@@ -68,8 +68,9 @@ def read_speeds(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:
     Raises:
         DataError: it is none.
     """
+    from jeat_graph.data.normal import Z95
     from jeat_graph.io.tables.file_tables import read_table
-    from jeat_graph.road.speeds import Z95, is_told
+    from jeat_graph.road.speeds import is_told
 
     table = read_table(path, ("t", "track_id", "speed_kmh", "var_speed_kmh"))
     speed = table.number("speed_kmh", blank_ok=True, nan_ok=True)

@@ -17,9 +17,9 @@ import numpy as np
 
 from jeat_graph.config.fields import check, number
 from jeat_graph.data.arrays import BoolArray, FloatArray
+from jeat_graph.data.normal import Z95
 from jeat_graph.road.conflicts.measures import Collision, arrivals, collision, encroachment, separation
 from jeat_graph.road.conflicts.poses import HEADING, LENGTH, SPEED, WIDTH, Poses
-from jeat_graph.road.speeds import Z95
 
 REAR_END, CROSSING, HEAD_ON = "rear-end", "crossing", "head-on"
 _STEP_S, _COARSE_S = 0.05, 0.15

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.normal import Z95
 from jeat_graph.io.tables.table_writer import write_columns
 from jeat_graph_sehn.simulation.corridor.traffic import KINDS, Driven
 
 _KMH = 3.6
-_Z95 = 1.959964
 #: Longest lengths of the classes as `road` tells them (m).
 _CLASS_LENGTHS = (3.0, 5.2, 7.0)
 
@@ -101,7 +101,7 @@ def write_seen(seen: Seen, folder: Path, errors: CameraErrors) -> None:
     count = len(seen.t)
     track_id = np.arange(1, count + 1)
     lane = (seen.lane + 1).astype(np.str_)
-    low, high = (_KMH * (seen.speed + sign * _Z95 * seen.sigma_speed) for sign in (-1.0, 1.0))
+    low, high = (_KMH * (seen.speed + sign * Z95 * seen.sigma_speed) for sign in (-1.0, 1.0))
     speed = _rounded(_KMH * seen.speed, low, high)
     kind = np.array(KINDS)[np.searchsorted(_CLASS_LENGTHS, seen.length)]
     crossings = {
