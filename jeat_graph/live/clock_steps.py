@@ -7,7 +7,7 @@ clock by which a sensor's own intervals are judged, and the clock on the wall is
 ==========================  ==========================================================================
 a scan                      what is done
 ==========================  ==========================================================================
-jumps ahead                 held, and those behind it, until others tell which it was (half a second)
+jumps ahead                 held, and those behind it, until others tell which it was (at most a second)
 … others go on as before    the clock stepped: the jump is taken off its times from here on
 … others jump as far        all paused: the held ones are taken as they are
 … its next ones do not      that one time was wrong: passed over
@@ -35,8 +35,11 @@ _AHEAD, _BACK, _OTHERS = 3, 5, 2
 _BACK_LATE = 25
 #: The others have jumped too where they went on by this share of the jump.
 _SHARE = 0.5
+#: ... and after so long (s of its own times) in which another went on beside it, to this (s), or to so many of
+#: the other's intervals. Who has a backlog, as after a broker's failure, catches up, and is no witness meanwhile.
+_BESIDE_S, _EVEN_S, _EVEN_INTERVALS = 0.3, 0.05, 1.5
 #: Nobody is held for longer than this (s of its own times), or than so many intervals of a witness.
-_HELD_S, _HELD_INTERVALS = 0.5, 6.0
+_HELD_S, _HELD_INTERVALS = 1.0, 6.0
 
 
 class ClockStep(NamedTuple):
@@ -111,6 +114,8 @@ class _Doubt:
         count: its scans since.
         others: scans of others since.
         held: scans that wait.
+        beside: by sensor since when it goes on beside this one (s), and how far it was ahead since, at least and
+            at most (s).
     """
 
     before: float
@@ -120,6 +125,7 @@ class _Doubt:
     count: int = 1
     others: int = 0
     held: list[Scan] = field(default_factory=list)
+    beside: dict[str, tuple[float, float, float]] = field(default_factory=dict)
 
     @property
     def jump(self) -> float:
@@ -175,6 +181,7 @@ class ClockSteps:
                     self._goes_on(scan)
                 take.append(scan)
                 continue
+            self._look_beside(doubt)
             if doubt.jump > 0.0:
                 doubt.held.append(scan)
                 held.append(scan)
@@ -202,6 +209,8 @@ class ClockSteps:
         for marks in (*self._marks.values(), *(doubt.marks for doubt in self._doubts.values())):
             if sensor in marks:
                 marks[sensor] -= lag_s
+        for doubt in self._doubts.values():
+            doubt.beside.clear()
         doubt = self._doubts.get(sensor)
         if doubt is not None:
             doubt.before, doubt.first = doubt.before - lag_s, doubt.first - lag_s
@@ -275,7 +284,7 @@ class ClockSteps:
             if together or self._paused(doubt, others, doubts):
                 released += doubt.held
                 self._close(name, doubt, 0.0)
-            elif doubt.count >= self._enough(doubt) and doubt.others >= _OTHERS:
+            elif self._settled(doubt, others):
                 step = self._step(name, doubt, others)
                 steps.append(step)
                 released += doubt.held
@@ -299,6 +308,25 @@ class ClockSteps:
             >= _SHARE * doubt.jump
             for other in others
         )
+
+    def _settled(self, doubt: _Doubt, others: Sequence[str]) -> bool:
+        """Whether the sensor goes on beside another as if nothing had been but the jump."""
+        if doubt.count < self._enough(doubt) or doubt.others < _OTHERS:
+            return False
+        return doubt.jump < 0.0 or any(
+            doubt.newest - doubt.beside[other][0] >= _BESIDE_S for other in others if other in doubt.beside
+        )
+
+    def _look_beside(self, doubt: _Doubt) -> None:
+        """Note since when each of the others has gone on as this sensor does."""
+        for name, one in self._rhythms.items():
+            if name in doubt.marks and one.known:
+                ahead = one.newest - doubt.newest
+                since, least, most = doubt.beside.get(name, (doubt.newest, ahead, ahead))
+                least, most = min(least, ahead), max(most, ahead)
+                if most - least > max(_EVEN_S, _EVEN_INTERVALS * one.usual):
+                    since, least, most = doubt.newest, ahead, ahead
+                doubt.beside[name] = (since, least, most)
 
     def _enough(self, doubt: _Doubt) -> int:
         """So many scans make a step; where scans may come as late as that, it takes many."""

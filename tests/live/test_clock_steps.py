@@ -73,6 +73,27 @@ def test_a_pause_of_one_sensor_or_of_all_is_no_step(who, gap_s):
     assert all(one.t == true for true, one in taken)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_backlog_that_is_caught_up_is_no_step(seed):
+    """The pictures of a failure are lost, the events lie in the broker and come faster than they were sent."""
+    rng = np.random.default_rng(seed)
+    begin, gap_s, faster = 3.0, rng.uniform(0.15, 2.0), rng.uniform(1.5, 50.0)
+    again = begin + gap_s + rng.uniform(0.0, 0.3)  # when the broker's client is connected again
+    rates = {"rgb": rng.choice([10.0, 20.0, 30.0]), "evt": rng.choice([20.0, 50.0, 100.0])}
+    came = []
+    for name, rate in rates.items():
+        for t in np.arange(1, round(7.0 * rate)) / rate:
+            if name == "rgb":
+                # Some pictures wait in the camera's own queue and come at once.
+                lost = begin < t < begin + gap_s - rng.integers(4) / rate
+                came += [] if lost else [(max(t, begin + gap_s) if t > begin else t, t, name)]
+            else:
+                came.append((t if t <= begin else max(t, again + (t - begin) / faster), t, name))
+    times = [(t, name, t) for _, t, name in sorted(came)]
+    _, found, _, together = judge(ClockSteps(LATE_S), times)
+    assert (found, together) == ([], [])
+
+
 def test_a_sensor_that_was_silent_before_the_other_began_comes_back_without_a_step():
     times = [
         (t, s, t) for t, s in arrivals(5.0) if (s == "evt") == (1.0 < t < 4.0) or (s == "rgb" and t > 4.0)
