@@ -35,8 +35,8 @@ _AHEAD, _BACK, _OTHERS = 3, 5, 2
 _BACK_LATE = 25
 #: The others have jumped too where they went on by this share of the jump.
 _SHARE = 0.5
-#: ... and after so long (s of its own times) in which another went on beside it, to this (s), or to so many of
-#: the other's intervals. Who has a backlog, as after a broker's failure, catches up, and is no witness meanwhile.
+#: ... and after so long (s of its own times) in which another went on beside it, to this (s), or to so many
+#: of the other's intervals. Who has a backlog, as after a broker's failure, catches up: no witness meanwhile.
 _BESIDE_S, _EVEN_S, _EVEN_INTERVALS = 0.3, 0.05, 1.5
 #: Nobody is held for longer than this (s of its own times), or than so many intervals of a witness.
 _HELD_S, _HELD_INTERVALS = 1.0, 6.0
@@ -114,8 +114,8 @@ class _Doubt:
         count: its scans since.
         others: scans of others since.
         held: scans that wait.
-        beside: by sensor since when it goes on beside this one (s), and how far it was ahead since, at least and
-            at most (s).
+        beside: by sensor since when it goes on beside this one (s), and how far it was ahead since, at least
+            and at most (s).
     """
 
     before: float
@@ -339,7 +339,9 @@ class ClockSteps:
         if doubt.jump < 0.0 and -doubt.jump <= self._late_s and doubt.count < _BACK_LATE:
             return False
         usual = max((self._rhythms[other].usual for other in others), default=0.0)
-        return doubt.newest - doubt.first > max(_HELD_S, _HELD_INTERVALS * usual)
+        # By the others' times too: a sensor that says no more after a jump would be held for ever.
+        waited = max(doubt.newest - doubt.first, self._went_on(doubt.marks, others))
+        return waited > max(_HELD_S, _HELD_INTERVALS * usual)
 
     def _step(self, name: str, doubt: _Doubt, others: Sequence[str]) -> ClockStep:
         rhythm = self._rhythms[name]

@@ -75,7 +75,7 @@ def test_a_pause_of_one_sensor_or_of_all_is_no_step(who, gap_s):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_backlog_that_is_caught_up_is_no_step(seed):
-    """The pictures of a failure are lost, the events lie in the broker and come faster than they were sent."""
+    """The pictures of a failure are lost; the events wait in the broker and come faster than in time."""
     rng = np.random.default_rng(seed)
     begin, gap_s, faster = 3.0, rng.uniform(0.15, 2.0), rng.uniform(1.5, 50.0)
     again = begin + gap_s + rng.uniform(0.0, 0.3)  # when the broker's client is connected again
@@ -92,6 +92,17 @@ def test_a_backlog_that_is_caught_up_is_no_step(seed):
     times = [(t, name, t) for _, t, name in sorted(came)]
     _, found, _, together = judge(ClockSteps(LATE_S), times)
     assert (found, together) == ([], [])
+
+
+@pytest.mark.parametrize("count", range(1, 12))
+def test_a_sensor_that_says_no_more_after_a_jump_is_not_held(count):
+    """Its last scans go on when the others have gone on for a second."""
+    times = [(t, s, t) for t, s in arrivals(6.0) if s == "rgb" or t < 3.0]
+    last = [(3.7 + 0.01 * k, "evt", 4.7 + 0.01 * k) for k in range(count)]
+    steps = ClockSteps(LATE_S)
+    taken, *_ = judge(steps, sorted(times + last))
+    assert len(taken) == len(times) + count
+    assert steps.clear() == []
 
 
 def test_a_sensor_that_was_silent_before_the_other_began_comes_back_without_a_step():
