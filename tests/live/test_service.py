@@ -294,9 +294,9 @@ silent_s: 2
             answers.commit()
         answers.close()
     answered = {one["of"] for one in found if one.get("source") == "gantry7"}
-    # What is late beside the camera, which went on while the broker was gone, is passed over and counted. Scans
-    # after a pause wait until it is clear that no clock stepped (a second at most); the answer to them names the
-    # message that ended that.
+    # What is late beside the camera, which went on while the broker was gone, is passed over and
+    # counted. After a pause scans wait until it is clear that no clock stepped (a second at most);
+    # the answer to them names the message that ended that.
     assert publisher.count - len(answered) <= health["messages"]["passed_over"] + SCANS_HZ
     assert not service.said("clock has leapt")
     assert answered
