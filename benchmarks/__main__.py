@@ -49,6 +49,10 @@ KINDS = {
         "benchmarks.handover",
         "vehicles followed from camera to camera, on simulated roads and real highways",
     ),
+    "corridor": (
+        "benchmarks.corridor",
+        "memory and processor time of many cameras in one service, in real time",
+    ),
     "speed": ("benchmarks.speed", "time per step, against others"),
     "endurance": (
         "benchmarks.endurance",

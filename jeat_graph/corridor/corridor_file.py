@@ -13,6 +13,7 @@ import yaml
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.corridor.corridor_tables import Corridor
 from jeat_graph.corridor.handover import Handover, KnownGap
+from jeat_graph.corridor.learnt_gap import LearntGap, learnt_gap, model_tree
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.files.atomic import open_atomic
@@ -60,6 +61,7 @@ def _gap_tree(over: Handover) -> dict[str, Any]:
                 before: {after: _short(value) for after, value in zip(sides[1], row, strict=True)}
                 for before, row in zip(sides[0], _shares(over, name), strict=True)
             }
+    tree["model"] = model_tree(over)
     return tree
 
 
@@ -81,6 +83,22 @@ def read_known_gaps(path: str | Path) -> list[KnownGap]:
     Raises:
         DataError: names the file and what is missing or not valid.
     """
+    return [_known(one, path) for one in _gaps(path)]
+
+
+def read_learnt_gaps(path: str | Path) -> list[LearntGap]:
+    """Read the gaps with their models, for vehicles that are followed while they drive.
+
+    Raises:
+        DataError: names the file and what is missing or not valid.
+    """
+    trees = _gaps(path)
+    for one in trees:
+        _known(one, path)
+    return [learnt_gap(one, path) for one in trees]
+
+
+def _gaps(path: str | Path) -> list[Any]:
     try:
         tree = load_yaml(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -90,7 +108,7 @@ def read_known_gaps(path: str | Path) -> list[KnownGap]:
     gaps = tree.get("gaps") if isinstance(tree, Mapping) else None
     if not isinstance(gaps, list) or not gaps:
         raise DataError("must hold gaps, a list of those between the cameras", path)
-    return [_known(one, path) for one in gaps]
+    return gaps
 
 
 def _known(tree: Any, path: str | Path) -> KnownGap:

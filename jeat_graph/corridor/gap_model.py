@@ -101,12 +101,15 @@ class Gap:
         after: at B.
         traffic_before: (A,) ln of the traffic's speed.
         traffic_after: (B,) the same.
+        apart_variance: of ln speeds less those of the traffic at B, of vehicles that have nothing to do with
+            each other; NaN takes that of those at B.
     """
 
     before: Passages
     after: Passages
     traffic_before: FloatArray
     traffic_after: FloatArray
+    apart_variance: float = math.nan
 
     @classmethod
     def of(cls, before: Passages, after: Passages) -> Gap:
@@ -257,7 +260,10 @@ def _speed_ratio(gap: Gap, pairs: PassagePairs, p: GapParameters) -> FloatArray:
     z_i, z_j = gap.own_before[pairs.i], gap.own_after[pairs.j]
     error = gap.after.sigma_speed[pairs.j] ** 2 + (p.carry * gap.before.sigma_speed[pairs.i]) ** 2
     joined = _log_normal(z_j - p.carry * z_i, p.speed_spread**2 + error)
-    apart = _log_normal(z_j, np.full(len(z_j), max(float(gap.own_after.var()), 1e-6)))
+    variance = gap.apart_variance
+    if math.isnan(variance):
+        variance = max(float(gap.own_after.var()), 1e-6)
+    apart = _log_normal(z_j, np.full(len(z_j), variance))
     return np.asarray(joined - apart)
 
 

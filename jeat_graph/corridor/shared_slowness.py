@@ -82,32 +82,33 @@ def smoothed(
     t: FloatArray, value: FloatArray, variance: FloatArray, sigma: float, time_s: float
 ) -> FloatArray:
     """Return the posterior mean (N,) of the process."""
+    # In Python's own numbers: element by element, arrays are slow.
     _, mean, var, keep = _filtered(t, value, variance, sigma, time_s)
-    out = mean.copy()
     for k in range(len(t) - 2, -1, -1):
         predicted = keep[k + 1] ** 2 * var[k] + sigma**2 * (1.0 - keep[k + 1] ** 2)
         gain = keep[k + 1] * var[k] / predicted if predicted > 0.0 else 0.0
-        out[k] = mean[k] + gain * (out[k + 1] - keep[k + 1] * mean[k])
-    return out
+        mean[k] += gain * (mean[k + 1] - keep[k + 1] * mean[k])
+    return np.array(mean, dtype=np.float64)
 
 
 def _filtered(
     t: FloatArray, value: FloatArray, variance: FloatArray, sigma: float, time_s: float
-) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+) -> tuple[float, list[float], list[float], list[float]]:
     """Log likelihood of the observations; filtered means and variances (N,); correlations (N,)."""
-    keep = np.exp(-np.diff(t, prepend=t[:1]) / time_s)
-    mean, var = np.zeros(len(t)), np.zeros(len(t))
+    keep: list[float] = np.exp(-np.diff(t, prepend=t[:1]) / time_s).tolist()
+    mean, var = [], []
     m, p, total = 0.0, sigma**2, 0.0
-    for k in range(len(t)):
-        m *= keep[k]
-        p = keep[k] ** 2 * p + sigma**2 * (1.0 - keep[k] ** 2)
-        if math.isfinite(variance[k]):
-            s = p + variance[k]
-            y = value[k] - m
+    for held, seen, noise in zip(keep, value.tolist(), variance.tolist(), strict=True):
+        m *= held
+        p = held**2 * p + sigma**2 * (1.0 - held**2)
+        if noise < math.inf:
+            s = p + noise
+            y = seen - m
             total -= 0.5 * (y * y / s + math.log(s))
             m += p / s * y
-            p *= variance[k] / s
-        mean[k], var[k] = m, p
+            p *= noise / s
+        mean.append(m)
+        var.append(p)
     return total, mean, var, keep
 
 

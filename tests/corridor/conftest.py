@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("jeat_graph_sehn")
 
+from jeat_graph.cli.main import main
 from jeat_graph_sehn.simulation.corridor.traffic import CorridorTraffic
 from jeat_graph_sehn.simulation.corridor.writing import write_corridor_world
 
@@ -16,6 +17,16 @@ def road(tmp_path_factory):
     out = tmp_path_factory.mktemp("corridor")
     config = CorridorTraffic(300.0, 1800.0, places_m=(0.0, 300.0, 700.0), leave=0.05, join=0.05)
     write_corridor_world(config, 11, out)
+    return out
+
+
+@pytest.fixture(scope="session")
+def through(road, tmp_path_factory):
+    """What `handover` writes of the corridor, the cameras given in another order than traffic passes them."""
+    out = tmp_path_factory.mktemp("through")
+    cameras = [f"{name}={road / name}" for name in "CAB"]
+    gaps = ["--distance", "A-B=300±3", "--distance", "B-C=400±4"]
+    assert main(["handover", *cameras, *gaps, "--interval", "150", "--out", str(out)]) == 0
     return out
 
 

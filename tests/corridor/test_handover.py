@@ -14,21 +14,10 @@ from jeat_graph.corridor.handover import KnownGap, chain
 from jeat_graph.corridor.passages import read_passages
 from jeat_graph.data.errors import DataError
 
-GAPS = ["--distance", "A-B=300±3", "--distance", "B-C=400±4"]
-
 
 def rows_of(path):
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
-
-
-@pytest.fixture(scope="module")
-def through(road, tmp_path_factory):
-    """What `handover` writes of the corridor, the cameras given in another order than traffic passes them."""
-    out = tmp_path_factory.mktemp("through")
-    cameras = [f"{name}={road / name}" for name in "CAB"]
-    assert main(["handover", *cameras, *GAPS, "--interval", "150", "--out", str(out)]) == 0
-    return out
 
 
 def vehicles(road):

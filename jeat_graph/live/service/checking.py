@@ -20,7 +20,15 @@ from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.detection.named import AUTO, EVENTS, FRAMES, MOTION, network_file
 from jeat_graph.live.late import LiveTracker, check_saved
 from jeat_graph.live.service.cameras import Cameras, detect_request
-from jeat_graph.live.service.config import STDOUT, ServiceConfig, SourceConfig, TrackedBy, full_url
+from jeat_graph.live.service.config import (
+    STDOUT,
+    ServiceConfig,
+    SourceConfig,
+    StateConfig,
+    TrackedBy,
+    full_url,
+)
+from jeat_graph.live.service.corridor_config import CorridorConfig
 from jeat_graph.live.service.ends import check_packages
 from jeat_graph.live.service.log import Log
 from jeat_graph.live.service.status import Status
@@ -65,6 +73,30 @@ def check_start(config: ServiceConfig, *, detectors: bool) -> None:
                 _check_camera(source, detectors)
             except JeatGraphError as error:
                 raise ConfigError(f"sources[{k}].detector: {error}") from None
+
+
+def check_corridor(config: CorridorConfig, *, detectors: bool) -> None:
+    """Build what a start of a service with several cameras would build, and let go of it.
+
+    Args:
+        config: of the service.
+        detectors: as `check_start`.
+
+    Raises:
+        JeatGraphError: what would end a start, with the camera and the key where there is one.
+    """
+    config.gaps()
+    for name, one in config.cameras.items():
+        try:
+            check_start(one, detectors=detectors)
+        except JeatGraphError as error:
+            raise ConfigError(f"cameras.{name}: {error}") from None
+        config.watch(name)
+    whole = ServiceConfig(config.name, sinks=config.sinks, web=config.web)
+    check_packages(whole)
+    _check_web(whole)
+    folder = StateConfig(None if config.checkpoint is None else str(config.checkpoint))
+    _check_folders(replace(whole, state=folder))
 
 
 def tracker_config(

@@ -130,6 +130,22 @@ def read_service(path: str | Path) -> tuple[ServiceConfig, list[str]]:
         ConfigError: what is wrong, with the line.
     """
     source = Path(path)
+    text, tree = read_service_tree(path)
+    try:
+        made = resolved(built(tree), source.resolve().parent)
+        check_service(made)
+    except ConfigError as error:
+        raise with_line(error, str(path), lines_of(text)) from None
+    return made, warnings_of(made, source)
+
+
+def read_service_tree(path: str | Path) -> tuple[str, dict[str, Any]]:
+    """Return the text of a service's file, and its tree of keys.
+
+    Raises:
+        ConfigError: it cannot be read, or is no such tree.
+    """
+    source = Path(path)
     try:
         if source.stat().st_size > _MOST_BYTES:
             raise ConfigError(f"{path}: is larger than any such file")
@@ -145,15 +161,10 @@ def read_service(path: str | Path) -> tuple[ServiceConfig, list[str]]:
         raise ConfigError(f"{place}: not valid YAML: {getattr(error, 'problem', None) or error}") from None
     if not isinstance(tree, dict):
         raise ConfigError(f"{path}: must hold `key: value` lines")
-    try:
-        made = _resolved(_built(tree), source.resolve().parent)
-        _check(made)
-    except ConfigError as error:
-        raise with_line(error, str(path), lines_of(text)) from None
-    return made, _warnings(made, source)
+    return text, tree
 
 
-def _built(tree: Mapping[str, Any]) -> ServiceConfig:
+def built(tree: Mapping[str, Any]) -> ServiceConfig:
     """Make it of the tree; lists of sections are made one by one, for their numbers to be in messages."""
     lists = {"sources": SourceConfig, "sinks": SinkConfig}
     made: ServiceConfig = build(ServiceConfig, {k: v for k, v in tree.items() if k not in lists}, "")
@@ -166,7 +177,7 @@ def _built(tree: Mapping[str, Any]) -> ServiceConfig:
     return replace(made, **found)
 
 
-def _resolved(config: ServiceConfig, folder: Path) -> ServiceConfig:
+def resolved(config: ServiceConfig, folder: Path) -> ServiceConfig:
     """Take paths as seen from the folder of the file."""
 
     def at(path: str | None) -> str | None:
@@ -201,10 +212,15 @@ def _resolved(config: ServiceConfig, folder: Path) -> ServiceConfig:
     )
 
 
-def _check(config: ServiceConfig) -> None:
+def check_service(config: ServiceConfig, *, needs_sinks: bool = True) -> None:
+    """See that sources and sinks go together.
+
+    Raises:
+        ConfigError: what is wrong, with its key.
+    """
     if not config.sources:
         raise ConfigError("sources: names none; give the url of a broker, frames or events")
-    if not config.sinks:
+    if needs_sinks and not config.sinks:
         raise ConfigError("sinks: names none; give the url of a broker, or '-' for standard output")
     if sum(sink.url == STDOUT for sink in config.sinks) > 1:
         raise ConfigError("sinks: standard output is named twice")
@@ -279,7 +295,7 @@ def full_url(url: str, password_file: str | None, tls: TlsConfig | None) -> str:
     return f"{url}{'&' if '?' in url else '?'}{'&'.join(given)}"
 
 
-def _warnings(config: ServiceConfig, path: Path) -> list[str]:
+def warnings_of(config: ServiceConfig, path: Path) -> list[str]:
     """Return what may not be as it was meant: a password in a file that others may read."""
     urls = [source.given[1] for source in config.sources] + [sink.url for sink in config.sinks]
     open_to_others = path.stat().st_mode & stat.S_IROTH

@@ -75,6 +75,10 @@ class Sinks:
         """Give out that a sensor fails or is well again, or that its clock was found."""
         self._send(event.line(), None)
 
+    def line(self, line: str) -> None:
+        """Give out a line of JSON."""
+        self._send(line, None)
+
     def _send(self, line: str, message: ScanMessage | None) -> None:
         for sink, encoding, status in self._opened:
             with self._status.blocked():

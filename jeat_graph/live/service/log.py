@@ -44,6 +44,13 @@ class Log:
     def __init__(self, service: str, stream: TextIO | None = None) -> None:
         self._service, self._stream = service, stream or sys.stderr
         self._lock = threading.Lock()
+        self._always: dict[str, Any] = {}
+
+    def of(self, **always: Any) -> Log:
+        """Return a log that writes to the same place, with these values in every line."""
+        made = Log(self._service, self._stream)
+        made._lock, made._always = self._lock, self._always | always
+        return made
 
     @contextmanager
     def of_libraries(self) -> Iterator[None]:
@@ -76,7 +83,8 @@ class Log:
         """
         now = time.time()
         stamp = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(now)) + f".{int(now % 1.0 * _MS):03d}Z"
-        line = {"time": stamp, "level": level, "service": self._service, "text": without_logins(text), **more}
+        line = {"time": stamp, "level": level, "service": self._service, "text": without_logins(text)}
+        line |= self._always | more
         with self._lock:
             self._stream.write(json.dumps(line, ensure_ascii=False) + "\n")
             self._stream.flush()

@@ -13,11 +13,8 @@ from jeat_graph.live.service.status import Status
 _PREFIX = "jeat_graph_"
 
 
-class Metrics:
-    """Makes the text of `/metrics`.
-
-    Args:
-        status: of the service.
+class MetricsText:
+    """Makes the text of `/metrics` of what `collect` yields.
 
     Attributes:
         content_type: of the text.
@@ -26,7 +23,7 @@ class Metrics:
         ConfigError: the package `prometheus-client` is missing.
     """
 
-    def __init__(self, status: Status) -> None:
+    def __init__(self) -> None:
         try:
             from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
         except ImportError:
@@ -34,7 +31,7 @@ class Metrics:
                 f"/metrics needs a package more: {install('serve')}; or set web.port: 0"
             ) from None
         self.content_type: str = CONTENT_TYPE_LATEST
-        self._status, self._generate = status, generate_latest
+        self._generate = generate_latest
         self._registry: Any = CollectorRegistry()
         self._registry.register(self)
 
@@ -44,13 +41,39 @@ class Metrics:
 
     def collect(self) -> Iterator[Any]:
         """Yield the families of values, as the registry asks for them."""
-        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+        raise NotImplementedError
 
-        def family(kind: Any, name: str, text: str, rows: list[tuple[list[str], float]], *labels: str) -> Any:
-            made = kind(_PREFIX + name, text, labels=labels)
-            for values, value in rows:
-                made.add_metric(values, value)
-            return made
+
+def family(kind: Any, name: str, text: str, rows: list[tuple[list[str], float]], *labels: str) -> Any:
+    """Return a family of metrics.
+
+    Args:
+        kind: class of the family.
+        name: without the prefix that all have.
+        text: what it is.
+        rows: values of the labels, and the value.
+        labels: their names.
+    """
+    made = kind(_PREFIX + name, text, labels=labels)
+    for values, value in rows:
+        made.add_metric(values, value)
+    return made
+
+
+class Metrics(MetricsText):
+    """The metrics of a service.
+
+    Args:
+        status: of the service.
+    """
+
+    def __init__(self, status: Status) -> None:
+        self._status = status
+        super().__init__()
+
+    def collect(self) -> Iterator[Any]:
+        """Yield the families of values, as the registry asks for them."""
+        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
         status, now = self._status, time.monotonic()
         health = status.health()

@@ -7,7 +7,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError, DataError, JeatGraphError
@@ -53,6 +53,19 @@ class _Running:
     reading: StreamReading = field(default_factory=lambda: StreamReading(goes_on=True))
 
 
+class Watcher(Protocol):
+    """Is shown all answers of a service."""
+
+    def begin(self, state: Any) -> None:
+        """Go on from what `state` returned, or begin anew with None."""
+
+    def answered(self, t: float, table: Trajectories) -> None:
+        """Take in the tracks of a time (s), which has been answered."""
+
+    def state(self) -> Any:
+        """Return what a checkpoint keeps: plain data."""
+
+
 class Service:
     """Runs what a file describes.
 
@@ -60,13 +73,24 @@ class Service:
         config: of the service.
         log: takes what is to be said.
         sets_aside_damaged: whether a damaged checkpoint is renamed and the tracker begins anew; or refused.
+        interrupts: of the process, if it does more than this.
+        watcher: is shown all answers, and has its state in the checkpoint.
     """
 
-    def __init__(self, config: ServiceConfig, log: Log, *, sets_aside_damaged: bool = False) -> None:
+    def __init__(
+        self,
+        config: ServiceConfig,
+        log: Log,
+        *,
+        sets_aside_damaged: bool = False,
+        interrupts: Interrupts | None = None,
+        watcher: Watcher | None = None,
+    ) -> None:
         self._config, self._log = config, log
         self._sets_aside_damaged = sets_aside_damaged
         self.status = Status(config.name, config.silent_s)
-        self._interrupts = Interrupts()
+        self._interrupts = interrupts or Interrupts()
+        self._watcher = watcher
 
     def run(self) -> int:
         """Track until a signal comes.
@@ -82,11 +106,7 @@ class Service:
         with ExitStack() as stack:
             stack.enter_context(self._interrupts)
             stack.enter_context(log.of_libraries())
-            for path in (config.state.checkpoint, config.state.smoothed):
-                if path is not None:
-                    stack.enter_context(hold_file(path))
-            check_start(config, detectors=False)  # what is wrong is known before anything is opened
-            self._saved_tracker(None)
+            self._hold_and_check(stack)
             if config.web.port:
                 web = stack.enter_context(Web(config.web.host, config.web.port, status, log.say))
                 log.write(INFO, f"/health and /metrics at http://{config.web.host}:{web.port}")
@@ -101,6 +121,25 @@ class Service:
             except (JeatGraphError, OSError) as error:
                 log.write(ERROR, f"ends: {error}; a new start goes on from the checkpoint")
                 return TROUBLE
+
+    def run_beside(self) -> None:
+        """Track until a signal comes, as one of several in a process, which serves the web and listens to it.
+
+        Raises:
+            ConfigError: as `run`.
+            JeatGraphError, OSError: trouble that a new start may mend.
+        """
+        with ExitStack() as stack:
+            self._hold_and_check(stack)
+            self._serve(Cameras(self._config, self.status, self._log, stack), stack)
+
+    def _hold_and_check(self, stack: ExitStack) -> None:
+        """Hold the files that are written, and find out what is wrong before anything is opened."""
+        for path in (self._config.state.checkpoint, self._config.state.smoothed):
+            if path is not None:
+                stack.enter_context(hold_file(path))
+        check_start(self._config, detectors=False)
+        self._saved_tracker(None)
 
     def _stopped(self) -> bool:
         self._look_around()
@@ -157,6 +196,8 @@ class Service:
             more,
         )
         sinks.seq = more.get("kept", {}).get("seq", 0)
+        if self._watcher is not None:
+            self._watcher.begin(more.get("kept", {}).get("watcher"))
         running = _Running(session, sources, cameras, sinks, BadLines(log.say))
         cameras.begin()
         status.phase = RUNNING
@@ -226,6 +267,8 @@ class Service:
 
         def answer(t: float, table: Trajectories, message: ScanMessage, _: float) -> None:
             sinks.send(t, table, message)
+            if self._watcher is not None:
+                self._watcher.answered(t, table)
             status.answered(t, len(table), time.monotonic() - self._came)
 
         return answer
@@ -234,7 +277,8 @@ class Service:
         """Return what is to be kept beside the session's own state, which is being written."""
         self.status.saved = time.monotonic()
         self.status.counted.checkpoints += 1
-        return {"seq": sinks.seq}
+        kept: dict[str, Any] = {"seq": sinks.seq}
+        return kept if self._watcher is None else kept | {"watcher": self._watcher.state()}
 
     def _work(self, running: _Running) -> None:
         """Take what comes until a signal."""

@@ -6,15 +6,28 @@ import json
 import threading
 from collections.abc import Callable
 from http import HTTPStatus
-from typing import Self
+from typing import Any, Protocol, Self
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.io.streams.web_server import WebHandler, WebServer
-from jeat_graph.live.service.metrics import Metrics
+from jeat_graph.live.service.metrics import Metrics, MetricsText
 from jeat_graph.live.service.status import Status
 
 #: A client that says nothing is not waited for longer than this (s).
 _PATIENCE_S = 5
+
+
+class HasHealth(Protocol):
+    """What can say how it is doing."""
+
+    def health(self) -> dict[str, Any]:
+        """Return what `/health` says, with `ready`."""
+
+
+def metrics_of(status: Status | HasHealth) -> MetricsText:
+    """Return the metrics of a service of one rig."""
+    assert isinstance(status, Status)
+    return Metrics(status)
 
 
 class Web:
@@ -25,6 +38,7 @@ class Web:
         port: 0 takes any that is free.
         status: of the service.
         tell: takes a line of what could not be answered.
+        metrics: makes the text of `/metrics`; by default of a service of one rig.
 
     Attributes:
         port: the port that is listened at.
@@ -33,8 +47,15 @@ class Web:
         ConfigError: nothing can listen there, or a package is missing.
     """
 
-    def __init__(self, host: str, port: int, status: Status, tell: Callable[[str], object]) -> None:
-        metrics = Metrics(status)
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        status: Status | HasHealth,
+        tell: Callable[[str], object],
+        metrics: MetricsText | None = None,
+    ) -> None:
+        shown = metrics_of(status) if metrics is None else metrics
 
         class Handler(WebHandler):
             timeout = _PATIENCE_S
@@ -46,7 +67,7 @@ class Web:
                     code = HTTPStatus.OK if health["ready"] else HTTPStatus.SERVICE_UNAVAILABLE
                     self.answer(code, "application/json", json.dumps(health, indent=1).encode() + b"\n")
                 elif path == "/metrics":
-                    self.answer(HTTPStatus.OK, metrics.content_type, metrics.text())
+                    self.answer(HTTPStatus.OK, shown.content_type, shown.text())
                 else:
                     self.answer(HTTPStatus.NOT_FOUND, "text/plain", b"there are /health and /metrics\n")
 
