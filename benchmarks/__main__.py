@@ -66,6 +66,10 @@ KINDS = {
         "benchmarks.rigs",
         "pictures and clocks of two cameras brought together by the traffic they saw",
     ),
+    "joint": (
+        "benchmarks.joint",
+        "two sensors at one time, associated scan by scan or in one joint problem",
+    ),
     "stale": ("benchmarks.stale", "which tables were made by code that has changed since"),
     "events": ("benchmarks.events", "decoding and representations of events beside other packages"),
     "event-cameras": (

@@ -1,4 +1,7 @@
-"""Every constant of the reference model, once, with its unit and where it comes from.
+"""The constants of the model that may be changed (`Tracker(constants=…)`), with units and sources.
+
+What only bounds a computation, or follows from another definition, stands where it is used, in the C++ twin
+of a module too.
 
 Lengths are in sizes of the object (√(width · height)) wherever nothing else is said, so that the constants
 hold for any picture. "Prior" marks what only begins the learning of `noise_learning`, `object_probability`,

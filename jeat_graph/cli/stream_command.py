@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--joint",
         action="store_true",
         help="hold each scan back until a later time arrives, so that scans of one time on separate "
-        "lines give one answer",
+        "lines give one answer (with the engine `paper` also those within paper.pair_within_s)",
     )
     add(
         "--late",
@@ -140,6 +140,7 @@ def _run(args: argparse.Namespace, cameras: LiveDetecting | None) -> int:
     from jeat_graph.live.transport.patience import UnconfirmedError
 
     config = _config(args, cameras)
+    config, within_s = _pairing(args, config, cameras)
     live, more = _tracker(args, config)
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
@@ -167,7 +168,7 @@ def _run(args: argparse.Namespace, cameras: LiveDetecting | None) -> int:
                 if cameras is not None:
                     _take_from_cameras(cameras, session, interrupts, args.on_error)
                 else:
-                    _take_all(session, args, interrupts, source)
+                    _take_all(session, args, interrupts, source, within_s)
                 output.begin()  # an input without scans gives a table without rows
             finally:
                 # An error in a line, a signal or a reader that has gone: what is known is kept all the same.
@@ -194,6 +195,21 @@ def _check_ends(args: argparse.Namespace) -> None:
         raise ConfigError("--road gives rows that stay: it needs --late skip or --late refuse")
     if args.road is not None and args.checkpoint is not None:
         raise ConfigError("--road does not go with --checkpoint, which does not hold its windows")
+
+
+def _pairing(args: argparse.Namespace, config: Config, cameras: LiveDetecting | None) -> tuple[Config, float]:
+    """Return the settings without pairing, and how far apart (s) scans may be that are given out together."""
+    from dataclasses import replace
+
+    from jeat_graph.data.errors import ConfigError
+
+    if config.pair_within_s == 0.0:
+        return config, 0.0
+    if not args.joint or args.source is not None or cameras is not None:
+        raise ConfigError("paper.pair_within_s holds scans of stdin back: it needs --joint")
+    if any(sensor.latency_s for sensor in config.sensors.values()):
+        raise ConfigError("paper.pair_within_s does not go with sensors.NAME.latency_s in a stream")
+    return replace(config, paper=replace(config.paper, pair_within_s=0.0)), config.pair_within_s
 
 
 def _config(args: argparse.Namespace, cameras: LiveDetecting | None) -> Config:
@@ -276,7 +292,11 @@ def _ends(
 
 
 def _take_all(
-    session: Session, args: argparse.Namespace, interrupts: Interrupts, source: Source | None
+    session: Session,
+    args: argparse.Namespace,
+    interrupts: Interrupts,
+    source: Source | None,
+    within_s: float,
 ) -> None:
     from jeat_graph.data.tables.reading import Reading
     from jeat_graph.io.streams.stream_reading import StreamReading
@@ -289,7 +309,7 @@ def _take_all(
     try:
         if source is None:
             lines = interrupts.lines(sys.stdin.buffer)
-            for message, place in from_lines(lines, STDIN, args.joint, bad, how):
+            for message, place in from_lines(lines, STDIN, args.joint, bad, how, within_s):
                 _take(session, message, place, bad)
         else:
             _take_from(source, session, interrupts, bad, how)

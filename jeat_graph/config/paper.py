@@ -31,6 +31,14 @@ class PaperConfig(Section):
     confirm_hits: int = number(5, "1", "n_min: least number of its detections", low=1)
     max_gap_confirmed_s: float = number(0.5, "s", "τ_max of confirmed tracks")
     max_gap_tentative_s: float = number(0.2, "s", "τ_max of tentative tracks")
+    pair_within_s: float = number(
+        0.0,
+        "s",
+        "scans of different sensors no further apart than this are associated jointly, at the last one's "
+        "time; in recordings and with `stream --joint`",
+        0.0,
+        1.0,
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

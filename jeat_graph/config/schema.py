@@ -63,6 +63,11 @@ class Config:
                 )
 
     @property
+    def pair_within_s(self) -> float:
+        """How far apart scans of different sensors may be to be taken jointly (s): 0 but for `paper`."""
+        return self.paper.pair_within_s if self.tracker.engine == "paper" else 0.0
+
+    @property
     def sensor_names(self) -> tuple[str, ...]:
         """Names of the declared sensors, in alphabetical order."""
         return tuple(sorted(self.sensors))

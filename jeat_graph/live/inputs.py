@@ -22,6 +22,7 @@ def from_lines(
     joint: bool,
     bad: Callable[[DataError], None] | None,
     how: StreamReading,
+    within_s: float = 0.0,
 ) -> Iterator[tuple[ScanMessage, str]]:
     """Yield the scans of a text stream and their places.
 
@@ -31,8 +32,9 @@ def from_lines(
         joint: hold scans back until a later time is seen.
         bad: takes the error of a line that cannot be read, which is passed over; None raises it.
         how: what the lines do not say themselves.
+        within_s: with `joint`, scans of different sensors no further apart (s) are of one time, too.
     """
-    for batch in read_batches(lines, name, joint=joint, ordered=False, bad=bad, how=how):
+    for batch in read_batches(lines, name, joint=joint, within_s=within_s, ordered=False, bad=bad, how=how):
         yield ScanMessage(batch, "", None), f"{name}:{batch.lines[0]}: "
 
 

@@ -78,6 +78,8 @@ class LiveTracker(OneAtATime):
         if policy not in POLICIES:
             raise ConfigError(f"{policy!r} is not one of {', '.join(POLICIES)}")
         config = tracker.config
+        if config.pair_within_s:
+            raise ConfigError("paper.pair_within_s: whoever gives the scans pairs them (`stream --joint`)")
         if tracker.keeps_recording:
             raise ConfigError("smoother.identities: 'whole' needs the whole recording, in order of time")
         self.tracker = tracker

@@ -1,4 +1,4 @@
-"""Known constant delays of sensors: a recording's times as the sensors' own, not those of their arrival."""
+"""A recording's times as the tracker takes them: the sensors' own, not those of arrival; scans that meet."""
 
 from __future__ import annotations
 
@@ -8,16 +8,20 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.pairing import paired
 
 
 def at_measurement(detections: Detections, config: Config) -> Detections:
     """Take each sensor's known latency off the times of its scans (`sensors.NAME.latency_s`).
 
+    With the engine `paper`, scans that are then within `paper.pair_within_s` of each other get one time.
+
     Args:
         detections: a recording, as its files have it.
         config: the sensors; one that it does not declare has no latency.
     """
-    return taken_off(detections, {name: sensor.latency_s for name, sensor in config.sensors.items()})
+    own = taken_off(detections, {name: sensor.latency_s for name, sensor in config.sensors.items()})
+    return paired(own, config.pair_within_s)
 
 
 def taken_off(detections: Detections, late_s: Mapping[str, float]) -> Detections:

@@ -483,3 +483,14 @@ def test_videos_that_are_passed_over_are_told_of_once(monkeypatch, capsys):
     assert code == 0
     assert len(out.splitlines()) == 1
     assert err.count("passed over") == 1
+
+
+def test_paper_pairs_scans_of_two_sensors_where_it_holds_them_back(monkeypatch, capsys):
+    text = "".join(f'{{"t": {t}, "sensor": "{s}", "boxes": []}}\n' for t, s in [(0, "rgb"), (0.001, "evt")])
+    pair = ("--config", "paper", "--set", "paper.pair_within_s=0.002")
+    code, out, _ = stream(text, monkeypatch, capsys, *pair, "--joint")
+    assert (code, [json.loads(line)["t"] for line in out.splitlines()]) == (0, [0.001])
+    assert stream(text, monkeypatch, capsys, *pair)[::2] == (
+        2,
+        "jeat-graph stream: paper.pair_within_s holds scans of stdin back: it needs --joint\n",
+    )

@@ -43,6 +43,23 @@ def test_scans_that_are_joined_keep_count_of_boxes_without_area():
     assert ([scan.sensor for scan in batch.scans], batch.flat) == (["evt", "rgb"], 4)
 
 
+NEAR = [(0.0, "rgb"), (0.0012, "evt"), (0.01, "evt"), (0.0091, "rgb"), (0.02, "evt"), (0.02, "rgb")]
+
+
+@pytest.mark.parametrize("form", ["json", "csv"])
+def test_scans_of_two_sensors_within_a_tolerance_are_joined_at_the_later_time(form):
+    lines = [json.dumps({"t": t, "sensor": name, "boxes": []}) for t, name in NEAR]
+    if form == "csv":
+        lines = ["t,sensor,left,top,width,height,score", *(f"{t},{name},,,,," for t, name in NEAR)]
+    text = "".join(line + "\n" for line in lines)
+    found = batches(text, joint=True, within_s=0.002, ordered=False)
+    both = [(t, ["evt", "rgb"]) for t in (0.0012, 0.01, 0.02)]
+    assert [(one.t, [scan.sensor for scan in one.scans]) for one in found] == both
+    assert all(scan.t == one.t for one in found for scan in one.scans)
+    apart = batches(text, joint=True, ordered=False)
+    assert len(apart) == 5
+
+
 def test_a_row_of_csv_without_area_is_a_look_that_found_nothing():
     header = "t,sensor,left,top,width,height,score\n"
     first, second = batches(header + "0,rgb,1,2,0,4,.5\n1,rgb,1,2,3,4,.5\n1,rgb,1,2,3,0,.5\n")

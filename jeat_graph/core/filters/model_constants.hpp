@@ -1,4 +1,4 @@
-// Every constant of the model: what they are, their units and sources say filters/model_constants.py.
+// The constants that `Tracker(constants=…)` may change: what they are, their units and sources say filters/model_constants.py.
 #pragma once
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// Singer's motion model of one axis, [p, v, a, l, r]; the formulas are in filters/singer.py.
+// Singer's motion model of one axis, [p, v, a, l, r, b, c], seven states; the formulas are in filters/singer.py.
 #pragma once
 
 #include <array>

@@ -35,6 +35,7 @@ def read_batches(
     name: str,
     *,
     joint: bool = False,
+    within_s: float = 0.0,
     ordered: bool = True,
     bad: Callable[[DataError], object] | None = None,
     how: StreamReading | None = None,
@@ -56,6 +57,7 @@ def read_batches(
         lines: lines with their ends.
         name: name of the stream, for messages.
         joint: wait for a later time.
+        within_s: with `joint`, scans of different sensors no further apart (s) are of one time, too.
         ordered: refuse a scan that is older than the one held back; otherwise it is given out before that
             one is.
         bad: takes the error of a line that cannot be read, which is then passed over; None raises it.
@@ -73,11 +75,12 @@ def read_batches(
             continue
         if text.startswith(("{", "[")):
             parts = _json_batches(text, number, numbered, name, (trying, how))
-            yield from joined(parts, name, ordered) if joint else parts
+            yield from joined(parts, name, ordered, within_s) if joint else parts
             return
         columns = trying(csv_columns, text, name, number)
         if columns is not None:
-            yield from joined(csv_batches(columns, numbered, name, trying, how), name, ordered)
+            rows = csv_batches(columns, numbered, name, trying, how)
+            yield from joined(rows, name, ordered, within_s if joint else 0.0)
             return
 
 
