@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 from jeat_graph.data.class_columns import LISTS_COUNT_FROM
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.frame_columns import collected
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.io.tables.class_names import names_by_number
 from jeat_graph.io.tables.detections_io import read_detections
@@ -62,6 +63,7 @@ def recording_of(detections: Detections | pd.DataFrame | PathLike, options: Read
         return read_detections(detections, **options)
     if isinstance(detections, Detections):
         return detections
+    detections = collected(detections)
     if hasattr(detections, "columns"):
         return Detections.from_pandas(detections, **for_frames(options))
     raise DataError(
@@ -85,6 +87,7 @@ def truth_of(truth: GroundTruth | pd.DataFrame | PathLike, options: ReadingOptio
         return read_truth(truth, **options)
     if isinstance(truth, GroundTruth):
         return truth
+    truth = collected(truth)
     if hasattr(truth, "columns"):
         from jeat_graph.data.truth_frames import truth_of_frame
 
@@ -118,6 +121,7 @@ def tables_of(
     check_kind(kind)
     if isinstance(tracks, Trajectories):
         return {kind: tracks}
+    tracks = collected(tracks)
     if hasattr(tracks, "columns"):
         return {kind: Trajectories.from_pandas(tracks, **for_frames(options))}
     raise DataError(
@@ -136,5 +140,6 @@ def for_frames(options: ReadingOptions) -> ReadingOptions:
 
 def as_list(values: Any) -> list[Any]:
     """Return one value, or several, as a list."""
+    values = collected(values)
     one = isinstance(values, (str, Path, Detections, GroundTruth))
     return [values] if one or hasattr(values, "columns") else list(values)

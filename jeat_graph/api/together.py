@@ -19,6 +19,7 @@ from jeat_graph.api.sources import (
 )
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import InputWarning
+from jeat_graph.data.frame_columns import collected
 from jeat_graph.data.frame_numbers import FrameCount
 from jeat_graph.data.notes import listening
 from jeat_graph.data.rates import ANY_RATE_HZ
@@ -80,6 +81,7 @@ def tracks_and_truth(
     Raises:
         DataError: one of them is not valid.
     """
+    tracks, truth = collected(tracks), collected(truth)
     is_read = isinstance(tracks, (str, Path)) or hasattr(tracks, "columns")
     of_tracks: ReadingOptions = {**options, "time_unit": "s"} if is_read else options
     readers = [truth_reader(truth, options), tracks_reader(tracks, kind, of_tracks)]
@@ -101,6 +103,7 @@ def recording_reader(
         return Reader(
             str(path), lambda first: read_detections_counted(path, None, None, _counting(options, first))
         )
+    detections = collected(detections)
     if hasattr(detections, "columns") and not isinstance(detections, Detections):
         frame, like = detections, for_frames(options)
 
@@ -117,6 +120,7 @@ def truth_reader(truth: GroundTruth | pd.DataFrame | PathLike, options: ReadingO
     if isinstance(truth, (str, Path)):
         path = truth
         return Reader(str(path), lambda first: read_truth_counted(path, None, _counting(options, first)))
+    truth = collected(truth)
     if hasattr(truth, "columns") and not isinstance(truth, GroundTruth):
         frame, like = truth, for_frames(options)
         return Reader("the truth", lambda first: truth_of_frame_counted(frame, _counting(like, first)))
@@ -129,6 +133,7 @@ def tracks_reader(
     """Return what reads tables by kind, with their first frame given; `kind` says what a table alone is."""
     if isinstance(tracks, (str, Path)):
         return _path_reader(Path(tracks), options)
+    tracks = collected(tracks)
     if hasattr(tracks, "columns") and not isinstance(tracks, Trajectories):
         check_kind(kind)
         frame, like = tracks, for_frames(options)

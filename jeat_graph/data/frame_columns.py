@@ -24,6 +24,13 @@ KNOWN_BOXES = (
 )
 
 
+def collected(source: Any) -> Any:
+    """Return a polars LazyFrame as the data frame that it stands for; anything else as it is."""
+    kind = type(source)
+    lazy = kind.__module__.partition(".")[0] == "polars" and kind.__name__ == "LazyFrame"
+    return source.collect() if lazy else source
+
+
 def has_columns(source: Any) -> bool:
     """Whether this is a table whose columns have names; those that are only numbered do not."""
     return hasattr(source, "columns") and any(isinstance(name, str) for name in labels_of(source))

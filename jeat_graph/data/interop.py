@@ -16,7 +16,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
 from jeat_graph.data.boxes import class_texts, detached, without_area
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_columns import detector_columns, has_columns
+from jeat_graph.data.frame_columns import collected, detector_columns, has_columns
 
 #: How arrays of boxes may be given: corner and size, two corners, or centre and size (px).
 FORMATS = ("ltwh", "xyxy", "xywh")
@@ -91,6 +91,7 @@ def _found_in(source: Any, form: str | None) -> _Found:
         source = source[0]
     if isinstance(source, dict):
         return _from_dict(source, form)
+    source = collected(source)
     own = hasattr(source, "xyxy") or _is_result(source)
     if (own or has_columns(source)) and form not in (None, "xyxy" if own else None):
         raise DataError(f"format {form!r} is for arrays; a {type(source).__name__} says itself what it holds")

@@ -9,6 +9,7 @@ import pytest
 
 from jeat_graph import (
     Detections,
+    Tracker,
     Trajectories,
     calibrate,
     compare,
@@ -132,13 +133,14 @@ def test_data_frames_and_files_are_read_alike_with_the_options_of_the_commands(t
         track(frame, classes=["bus"], **OPTIONS)
 
 
-@pytest.mark.parametrize("make", ["pandas", "arrow", "polars"])
+@pytest.mark.parametrize("make", ["pandas", "arrow", "polars", "lazy"])
 def test_every_kind_of_data_frame_is_a_table(make):
     frame = people_s_rows(5)
     if make == "arrow":
         frame = pytest.importorskip("pyarrow").Table.from_pandas(frame)
-    elif make == "polars":
+    elif make in ("polars", "lazy"):
         frame = pytest.importorskip("polars").from_pandas(frame)
+        frame = frame.lazy() if make == "lazy" else frame
     found = Detections.from_pandas(frame, **OPTIONS)
     assert found.scan_t.tolist() == [0.0, 0.05, 0.1, 0.15, 0.2]
     assert found.classes.tolist() == ["truck"] * 5
@@ -215,3 +217,25 @@ def test_one_class_may_stand_alone_and_what_is_no_list_of_names_is_refused():
             Detections.from_pandas(frame, **(OPTIONS | {"class_names": wrong}))
     with pytest.raises(DataError, match=r"the frame rate must be a number .Hz., not '20'"):
         Detections.from_pandas(frame, **(OPTIONS | {"rate_hz": "20"}))
+
+
+@pytest.mark.filterwarnings("error::UserWarning")
+def test_a_lazy_frame_is_taken_wherever_a_data_frame_is():
+    rows = people_s_rows(9)[lambda r: r.video == "a"].assign(
+        t=lambda r: r.frame / 20.0, sensor="rgb", score=0.9
+    )
+    rows = rows.drop(columns=["video", "frame"])
+
+    def as_lazy(frame):
+        return pytest.importorskip("polars").from_pandas(frame).lazy()
+
+    lazy = as_lazy(rows)
+    options = {"image": (1280, 720), "class_names": OPTIONS["class_names"]}
+    tracks, lazily = track(rows, **options), track(lazy, **options)
+    assert lazily.causal.t.tolist() == tracks.causal.t.tolist()
+    truth = rows.assign(object_id=1)
+    said = {"class_names": options["class_names"]}
+    assert evaluate(lazily, as_lazy(truth), **said) == evaluate(tracks, truth, **said)
+    one = rows.head(1)[["x1", "y1", "x2", "y2", "score"]]
+    taken = [Tracker(image=(1280, 720)).update(boxes, t=0.0, sensor="rgb") for boxes in (one, as_lazy(one))]
+    assert len(taken[0]) == len(taken[1])

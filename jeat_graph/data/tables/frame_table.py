@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_columns import named_columns
+from jeat_graph.data.frame_columns import collected, named_columns
 from jeat_graph.data.tables.file_table import FileTable
 
 
@@ -24,6 +24,7 @@ def table_of_frame(frame: Any, required: Sequence[str], optional: Sequence[str],
     Raises:
         DataError: it is no data frame; a column is missing or there twice.
     """
+    frame = collected(frame)
     if not hasattr(frame, "columns"):
         raise DataError(f"{what} are read from a data frame, not from {type(frame).__name__}")
     columns = named_columns(frame, required, optional, what)

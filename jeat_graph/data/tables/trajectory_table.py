@@ -12,7 +12,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.class_columns import class_column
 from jeat_graph.data.column_names import BOX, MEAN, SIZE_VAR, VAR, standing_in, usual_names
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.frame_columns import ASIDE, labels_of
+from jeat_graph.data.frame_columns import ASIDE, collected, labels_of
 from jeat_graph.data.frame_numbers import FrameCount
 from jeat_graph.data.tables.columns import boxes_of, classes_of, of_one_video, times_of
 from jeat_graph.data.tables.file_table import FileTable
@@ -207,6 +207,7 @@ def fields_of_frame(
     Raises:
         DataError: a column is missing, or a row (from 0) is no track.
     """
+    frame = collected(frame)
     if is_result(usual_names(labels_of(frame), RESULT_COLUMNS)):
         table = table_of_frame(frame, RESULT_COLUMNS, MORE_RESULT_COLUMNS, "tracks")
         found = rows_of_result(table, how, names)

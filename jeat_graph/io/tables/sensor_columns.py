@@ -23,6 +23,7 @@ from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.arrays import TextArray
 from jeat_graph.data.column_names import DEFAULT_SENSOR
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.frame_columns import collected
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.frame_table import table_of_frame
 from jeat_graph.io.formats.registry import recognise
@@ -77,6 +78,7 @@ def said_by(path: str | Path, sensor: str | None = None) -> Said:
 
 def said_by_frame(frame: Any) -> Said:
     """Return what a data frame says; errors as of `said_by`."""
+    frame = collected(frame)
     wanted = [str(name) for name in frame.columns if str(name).startswith(PREFIX)]
     return said_in(table_of_frame(frame, (), (_SENSOR, *wanted), "detections")) if wanted else {}
 
