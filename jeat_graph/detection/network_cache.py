@@ -21,7 +21,7 @@ from typing import Any
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.notes import note
 from jeat_graph.data.private_folder import is_private
-from jeat_graph.data.secrets import without_logins
+from jeat_graph.data.secrets import shown_url, without_logins
 from jeat_graph.detection.known_networks import KnownNetwork
 from jeat_graph.detection.models.onnx_head import read_onnx_head
 from jeat_graph.io.files.atomic import atomic_path
@@ -78,7 +78,7 @@ def fetched(network: KnownNetwork) -> Path:
             f"{_put(network)}"
         )
     mirror = os.environ.get(MIRROR)
-    address = f"{mirror.rstrip('/')}/{network.file}" if mirror else network.address
+    address = f"{_folder_of(mirror)}/{network.file}" if mirror else network.address
     place = cache_folder() / network.file
     with hold_file(place):
         path = cached(network)  # another process may have fetched it meanwhile
@@ -87,6 +87,25 @@ def fetched(network: KnownNetwork) -> Path:
             path = cached(network)
     assert path is not None
     return path
+
+
+def _folder_of(mirror: str) -> str:
+    """Return the address of the mirror's folder, without a slash at its end.
+
+    Raises:
+        DataError: it is no address of a folder on the web.
+    """
+    try:
+        parts = urllib.parse.urlsplit(mirror)
+        told = parts.hostname, parts.port  # a port that is none raises
+        good = parts.scheme in ("https", "http") and bool(told[0]) and not (parts.query or parts.fragment)
+    except ValueError:
+        good = False
+    if not good or not mirror.isprintable() or " " in mirror:
+        raise DataError(
+            f"{MIRROR} must be the address of a folder, as https://host/folder, not {shown_url(mirror)!r}"
+        )
+    return mirror.rstrip("/")
 
 
 def _fetch(network: KnownNetwork, address: str, place: Path) -> None:

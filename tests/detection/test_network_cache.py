@@ -239,3 +239,27 @@ def test_every_known_network_has_a_licence_and_a_way_to_get_it():
         assert bool(network.address) != bool(network.how)
         assert not network.address or network.address.startswith("https://")
         assert all(len(one) == 64 for one in network.sha256)
+
+
+@pytest.mark.parametrize(
+    "mirror",
+    [
+        "nonsense",
+        "htp://host/x",
+        "https://",
+        "https://[bad",
+        "https://host:port/x",
+        "https://a b/c",
+        "file:///etc",
+    ],
+)
+def test_a_mirror_that_is_no_address_is_named_before_anything_is_fetched(internet, monkeypatch, mirror):
+    handler, folder, _ = internet
+    monkeypatch.setenv(network_cache.MIRROR, mirror)
+    said = []
+    with (
+        listening(said.append),
+        pytest.raises(DataError, match="JEAT_GRAPH_MIRROR must be the address of a f"),
+    ):
+        fetched(PINNED)
+    assert (said, handler.asked, folder.exists() and any(folder.iterdir())) == ([], 0, False)

@@ -60,6 +60,20 @@ def test_a_workflow_may_write_nothing_but_what_a_job_asks_for(path):
                 assert step["with"]["persist-credentials"] is False
 
 
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_actions_are_named_by_the_hash_of_a_commit_with_its_version_beside_it(path):
+    used = re.findall(r"uses: (.+)", path.read_text(encoding="utf-8"))
+    assert used
+    assert [one for one in used if not re.fullmatch(r"[\w./-]+@[0-9a-f]{40} # v\d+(\.\d+)+", one)] == []
+
+
+def test_the_licence_expression_names_those_of_what_is_compiled_into_the_core():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    made = runpy.run_path(str(ROOT / ".ci" / "sbom.py"))
+    compiled = {one["licenses"][0]["license"]["id"] for one in made["compiled_components"]()}
+    assert set(project["license"].split(" AND ")) == {"Apache-2.0", *compiled}
+
+
 def test_make_targets_that_workflows_and_the_host_of_the_documentation_call_exist():
     targets = set(
         re.findall(r"^([\w.$()/-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
