@@ -238,7 +238,7 @@ def _health(port: int) -> dict[str, Any]:
     import urllib.request
 
     try:
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/health", timeout=10) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/health", timeout=_START_S) as answer:
             text = answer.read()
     except urllib.error.HTTPError as error:  # not ready: it says why
         text = error.read()

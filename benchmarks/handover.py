@@ -24,6 +24,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.normal import Z95
 
 if TYPE_CHECKING:
+    from benchmarks.corridor_layouts.record import CameraPair
     from jeat_graph.corridor.passages import Passages
     from jeat_graph.eval.tables import Cell, Table
     from jeat_graph_sehn.simulation.corridor.cameras import Seen
@@ -42,7 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "root",
         nargs="?",
         metavar="ROOT",
-        help="folder with BrnoCompSpeed's cameras (without: simulated only)",
+        help="folder with BrnoCompSpeed's cameras, AI City's scenarios or trajectories of I-24 MOTION "
+        "(without: simulated only)",
     )
     add("--draws", type=counting, default=15, metavar="N", help="roads of each scene (15)")
     add("--seed", type=natural, default=0, metavar="N", help="seed of the first (0)")
@@ -55,15 +57,47 @@ def run(args: argparse.Namespace) -> int:
 
 def measure(args: argparse.Namespace) -> dict[str, Any]:
     """Draw the roads and judge."""
-    from benchmarks.handover_real import judge_sessions
-
     seeds = range(args.seed, args.seed + args.draws)
     jobs = [(scene, seed) for scene in SCENES for seed in seeds]
     return {
         "benchmark": "handover",
         **provenance({"draws": args.draws, "seed": args.seed}, {}),
         "simulated": in_processes(judge_road, jobs, args.jobs, "simulated roads"),
-        "real": [] if args.root is None else judge_sessions(Path(args.root)),
+        "real": [] if args.root is None else judge_folder(Path(args.root)),
+    }
+
+
+def judge_folder(root: Path) -> list[dict[str, Any]]:
+    """Follow vehicles between the cameras of a folder, whatever its layout.
+
+    Raises:
+        DataError: it has none that is known, or a file that is not valid.
+    """
+    from benchmarks.corridor_layouts.registry import recognise
+    from benchmarks.handover_real import judge_sessions
+
+    if any(root.glob("*_left")):
+        return judge_sessions(root)
+    return [judge_pair(pair) for pair in recognise(root).pairs(root)]
+
+
+def judge_pair(pair: CameraPair) -> dict[str, Any]:
+    """Follow vehicles between two cameras; a pair that is refused says why."""
+    from jeat_graph.corridor.handover import KnownGap, hand_over
+
+    known = KnownGap("A", "B", pair.distance_m, pair.distance_sd_m)
+    out: dict[str, Any] = {"session": pair.name, "distance": pair.distance_m}
+    first, second = pair.first[pair.before.track_id], pair.second[pair.after.track_id]
+    try:
+        (over,) = hand_over([known], {"A": pair.before, "B": pair.after})
+    except DataError as error:
+        common = len(np.intersect1d(first, second))
+        return out | {"common": common, "refused": str(error)}
+    return {
+        **out,
+        **pair_scores(over, first, second),
+        "offset_error_s": over.fitted.parameters.offset_s - pair.offset_s,
+        "offset_sd_s": float(over.fitted.covariance[0, 0] ** 0.5),
     }
 
 
@@ -160,10 +194,11 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
                 "session": row["session"],
                 "m": f"{row['distance']:.0f}",
                 "vehicles in common": row["common"],
-                "F1": f1([row]),
-                "ECE": calibration_error([row]),
-                "clock error ms": 1e3 * row["offset_error_s"],
-                "± ms": 1e3 * row["offset_sd_s"],
+                "F1": None if "refused" in row else f1([row]),
+                "ECE": None if "refused" in row else calibration_error([row]),
+                "clock error ms": None if "refused" in row else 1e3 * row["offset_error_s"],
+                "± ms": None if "refused" in row else 1e3 * row["offset_sd_s"],
+                "refused": row.get("refused", ""),
             }
             for row in result["real"]
         ]
