@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
@@ -10,6 +13,7 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.tracking.appearance import Looks
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage
@@ -50,6 +54,7 @@ class SavedModel:
 
     if TYPE_CHECKING:
         config: Config
+        constants: ModelConstants
         _model: TrackEngine
         _diagnostics: bool
         _finished: bool
@@ -59,7 +64,9 @@ class SavedModel:
         _instants: SmoothedInstants
         _log: IdentityLog | None
 
-        def __init__(self, config: Config, *, diagnostics: bool = False) -> None:
+        def __init__(
+            self, config: Config, *, diagnostics: bool = False, constants: ModelConstants | None = None
+        ) -> None:
             """Make a tracker."""
 
         def snapshot(self) -> ModelSnapshot:
@@ -104,6 +111,7 @@ class SavedModel:
         return {
             "diagnostics": self._diagnostics,
             "finished": self._finished,
+            "constants": _changed(self.constants),
             "model": dict(self._model.state(now.moment)),
             "sensors": list(now.sensors),
             "classes": now.classes,
@@ -124,7 +132,8 @@ class SavedModel:
         Raises:
             DataError: no tracker can be in that state.
         """
-        tracker = cls(config, diagnostics=bool(state["diagnostics"]))
+        constants = _constants_of(state.get("constants", {}))
+        tracker = cls(config, diagnostics=bool(state["diagnostics"]), constants=constants)
         model = tracker._model
         try:
             model.set_state(state["model"])
@@ -153,6 +162,29 @@ class SavedModel:
         if model.time() is not None:
             tracker._watch.end()
         return tracker
+
+
+def _changed(constants: ModelConstants) -> dict[str, Any]:
+    """Return the constants of the model that are not the usual ones, by name."""
+    plain: dict[type, Callable[[Any], Any]] = {tuple: lambda values: tuple(map(float, values))}
+    return {
+        name: plain.get(type(usual), type(usual))(getattr(constants, name))
+        for name, usual in vars(ModelConstants()).items()
+        if getattr(constants, name) != usual
+    }
+
+
+def _constants_of(changed: Any) -> ModelConstants | None:
+    """Return the constants of the model where some were changed."""
+    usual = vars(ModelConstants())
+    if not isinstance(changed, dict) or not set(changed) <= set(usual):
+        raise DataError("is damaged: it has constants that the model has not")
+    for name, value in changed.items():
+        kind, numbers = type(usual[name]), value if isinstance(value, tuple) else (value,)
+        same = type(value) is kind and (kind is not tuple or len(value) == len(usual[name]))
+        if not same or not all(type(one) in (int, float) and math.isfinite(one) for one in numbers):
+            raise DataError(f"is damaged: the constant {name} is none")
+    return replace(ModelConstants(), **changed) if changed else None
 
 
 def _check_order(order: Any, given: Any, count: int) -> None:

@@ -129,7 +129,7 @@ def test_what_is_cut_off_is_not_kept(without_login):
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("mirror", ["http://127.0.0.1:9/nets", "file:///etc", "http://127.0.0.1:{port}/else"])
+@pytest.mark.parametrize("mirror", ["http://127.0.0.1:9/nets", "http://127.0.0.1:{port}/else"])
 def test_without_a_network_it_says_what_to_put_where(without_login, monkeypatch, mirror):
     _, folder, server = without_login
     monkeypatch.setenv(network_cache.MIRROR, mirror.format(port=server.server_port))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +12,7 @@ from hypothesis import strategies as st
 
 from jeat_graph import Tracker, load_config
 from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.io.files.packing import pack, unpack
 from jeat_graph.io.files.state_file import read_state_file, write_state_file
 from jeat_graph.live.late import LiveTracker
@@ -324,3 +328,27 @@ def test_a_tracker_of_late_scans_is_loaded_as_such(tmp_path):
         Tracker.load(tmp_path / "state.npz")
     loaded, _ = LiveTracker.load(tmp_path / "state.npz")
     assert bytes_of(loaded.causal()) == bytes_of(live.causal())
+
+
+def test_constants_of_one_s_own_are_saved_with_the_state(tmp_path):
+    own = replace(ModelConstants(), report=0.7, jerk=3, walk_bounds=(0.2, 5))
+    scans = list(traffic(3))
+    tracker, usual = Tracker(image=_SIZE, constants=own), Tracker(image=_SIZE)
+    for scan in scans[:40]:
+        tracker.step(scan)
+        usual.step(scan)
+    tracker.save(tmp_path / "state.npz")
+    loaded, copied = Tracker.load(tmp_path / "state.npz"), copy(tracker)
+    assert loaded.constants == copied.constants == own
+    for scan in scans[40:]:
+        expected = bytes_of(tracker.step(scan))
+        assert bytes_of(loaded.step(scan)) == expected == bytes_of(copied.step(scan))
+        other = bytes_of(usual.step(scan))
+    assert other != expected
+
+
+@pytest.mark.parametrize("forged", [{"report": float("nan")}, {"walk_bounds": 1.0}, {"none": 1.0}, [1]])
+def test_constants_that_are_none_are_refused(forged):
+    tracker = Tracker(image=_SIZE)
+    with pytest.raises(DataError, match=r"is damaged: .*constant"):
+        Tracker.from_state(tracker.config, {**tracker.state(), "constants": forged})
