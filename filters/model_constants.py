@@ -114,7 +114,9 @@ class ModelConstants:
         gap_prior_count: gaps that the prior counts for.
         gap_prior_least: shortest u of the prior.
         gap_overlap: IoU with the predicted box from which on a gap ended well.
-        sure: posterior at the end of a track from which on it tells what the track has been all along.
+        sure: posterior at the end of a track from which on it tells what the track was before.
+        turning_s: that counts for exp(−τ / this) at τ before the track was first likelier real than not (s).
+            Measured: of rows that this gives, as many are right as are wrong at 0.25 to 0.4 s before.
         longest_gap_s: a track that nobody has seen for so long ends (s).
         camera_shift_std, camera_scale_std: of common shift (sizes) and scale between two scans. Prior.
         camera_shift_bounds, camera_scale_bounds: of the learnt values.
@@ -240,6 +242,7 @@ class ModelConstants:
     gap_prior_least: float = 0.3
     gap_overlap: float = 0.5
     sure: float = 0.9
+    turning_s: float = 0.4
     longest_gap_s: float = 3.0
 
     camera_shift_std: float = 0.05

@@ -158,6 +158,7 @@ class History:
         called: in the rows.
         missed: what had been missed by the last entry that was given out; below 0 before the first.
         later: what was known by later of the last detection that was given out; below 0 for nothing.
+        was_real: whether it was likelier real than not at any entry that was given out.
         entries: the updates.
     """
 
@@ -165,6 +166,7 @@ class History:
     called: Called
     missed: float = -1.0
     later: float = -1.0
+    was_real: bool = False
     entries: list[TrackUpdate] = field(default_factory=list)
 
     def window(self) -> FilteredTrack:
@@ -273,6 +275,7 @@ class Histories:
             "called": [tuple(one.called) for one in self._living],
             "missed": np.array([one.missed for one in self._living]),
             "later": np.array([one.later for one in self._living]),
+            "was_real": np.array([one.was_real for one in self._living], dtype=np.bool_),
             "track_id": np.array([one.track_id for one in self._living], dtype=np.int64),
             "entries": [_columns(one.entries) for one in self._living],
         }
@@ -285,13 +288,13 @@ class Histories:
         """
         try:
             missed, ids = state["missed"].tolist(), state["track_id"].tolist()
-            later = state["later"].tolist()
+            later, was_real = state["later"].tolist(), state["was_real"].tolist()
             called = [Called(int(given), int(label), float(share)) for given, label, share in state["called"]]
             entries = [_entries(one) for one in state["entries"]]
             living = [
-                History(int(track), name, float(number), float(known), updates)
-                for track, name, number, known, updates in zip(
-                    ids, called, missed, later, entries, strict=True
+                History(int(track), name, float(number), float(known), bool(real), updates)
+                for track, name, number, known, real, updates in zip(
+                    ids, called, missed, later, was_real, entries, strict=True
                 )
             ]
             rows = joined([tuple(state["rows"])])
@@ -321,6 +324,8 @@ class Histories:
         for one, states in zip(ready, found, strict=True):
             rows, count, one.missed, one.later = self._rows_of(one, now - self._lag_s, gaps, states)
             self._rows.append(rows)
+            report = self._existence.constants.report
+            one.was_real |= any(entry.last_of_step and entry.real > report for entry in one.entries[:count])
             del one.entries[:count]
             self._solver.leave(one.track_id, count)
 
@@ -356,10 +361,11 @@ class Histories:
         """Return a window's rows until a time (s), how many entries these are, and the last one's `History`.
 
         A row's existence is the track's posterior at that time, or where it turned out to be real for sure,
-        what it turned out to be. (Less than sure tells nothing of the past: what began as a second box is
-        often taken over by an object.) While nobody sees the track, it counts times the probability that a
-        gap as long as it is to the nearer one of its ends ends well. What comes later may say less of the
-        detections around a row than what the track turned out to be.
+        what it turned out to be, times the probability that it had been so for as long as it took to turn
+        out: what began as a second box, or as one of nothing, is often taken over by an object. While nobody
+        sees the track, it counts times the probability that a gap as long as it is to the nearer one of its
+        ends ends well. What comes later may say less of the detections around a row than what it turned
+        out to be.
         """
         c, e = self._existence.constants, history.entries
         t = np.array([one.t for one in e])
@@ -385,6 +391,9 @@ class Histories:
         rows = told[given]
         around, known = known_around(later, last, history.later, count)
         turned = np.minimum(final, around[rows])
+        found = np.flatnonzero(real > c.report)
+        if not self._existence.of_any_time and not history.was_real and len(found):
+            turned = turned * np.exp(-np.maximum(t[found[0]] - t[rows], 0.0) / c.turning_s)
         is_real = np.maximum(real[rows], turned) if final > c.sure else real[rows]
         is_real = is_real * gap_survival.survival(gaps, nearer[given], c)
         shown = is_real > c.report

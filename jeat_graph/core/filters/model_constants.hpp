@@ -111,6 +111,7 @@ struct Bounds {
     JEAT_ONE(gap_prior_least) \
     JEAT_ONE(gap_overlap) \
     JEAT_ONE(sure) \
+    JEAT_ONE(turning_s) \
     JEAT_ONE(longest_gap_s) \
     JEAT_ONE(camera_shift_std) \
     JEAT_ONE(camera_scale_std) \

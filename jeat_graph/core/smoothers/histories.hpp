@@ -128,6 +128,7 @@ struct History {
     // What had been missed by the last entry that was given out; below 0 before the first.
     double missed = -1.0;
     double last_later = -1.0;  // of the last detection before the first entry
+    bool was_real = false;     // whether it was likelier real than not at any entry that was given out
     std::vector<Entry> entries;
 };
 
@@ -252,6 +253,10 @@ private:
             whole = entries[k].confirmed ? 0.0 : std::max(whole, entries[k].missed);
             if (seen_again) gap_[k] = whole;
         }
+        // What it turned out to be says the less of it the longer it took to turn out.
+        double real_at = history.was_real ? -kNever : kNever;
+        for (const Entry& e : entries)
+            if (e.last_of_step && e.real > c.report) real_at = std::min(real_at, e.t);
         // Of a gap both ends must be of an object. Where nothing later is known, what it turned out to be is.
         later_.assign(n, 1.0);
         double behind = -1.0, before = history.last_later;
@@ -271,7 +276,11 @@ private:
             if (e.later >= 0.0) last_later = e.later;
             const double nearer = std::min(e.missed, gap_[given] - missed_before);
             missed_before = e.missed;
-            double real = final_real > c.sure ? std::max(e.real, std::min(final_real, later_[given])) : e.real;
+            double real = e.real;
+            if (final_real > c.sure) {
+                const double already = std::exp(-std::max(real_at - e.t, 0.0) / c.turning_s);
+                real = std::max(real, std::min(final_real, later_[given]) * already);
+            }
             if (gap_[given] == kNotSeenAgain) continue;
             if (given + 1 < n && entries[given + 1].t == e.t) continue;  // a later step of the same time tells more
             real *= gaps.survival(nearer, c);
@@ -281,6 +290,8 @@ private:
         if (!forget) return;
         history.missed = missed_before;
         history.last_later = last_later;
+        for (std::size_t k = 0; k < given; ++k)
+            history.was_real |= entries[k].last_of_step && entries[k].real > c.report;
         entries.erase(entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(given));
     }
 
@@ -292,7 +303,7 @@ private:
         return F_;
     }
 
-    static constexpr double kNotSeenAgain = -1.0;
+    static constexpr double kNotSeenAgain = -1.0, kNever = std::numeric_limits<double>::infinity();
     double lag_s_, dt_ = -1.0;
     Matrix F_{};
     std::vector<History> living_;

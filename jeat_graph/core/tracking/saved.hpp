@@ -284,14 +284,16 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     std::vector<History>& living = histories.living();
     std::vector<std::int64_t> track_id, given, label, counts;
     std::vector<double> share, given_missed, last_later;
+    std::vector<std::uint8_t> was_real;
     EntryColumns columns;
     std::size_t expected = 0;
     for (const History& history : living) expected += history.entries.size();
     columns.reserve(expected);
     for (History& history : living) {
-        auto& [id, called, out, after, entries] = history;
+        auto& [id, called, out, after, real, entries] = history;
         track_id.push_back(id), given.push_back(called.track_id), label.push_back(called.label);
         share.push_back(called.share), given_missed.push_back(out), last_later.push_back(after);
+        was_real.push_back(real);
         counts.push_back(static_cast<std::int64_t>(entries.size()));
         for (Entry& entry : entries) columns.add(entry);
     }
@@ -305,6 +307,7 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
     v.column("histories.share", share, tracks, 1, Values::any);
     v.column("histories.given_missed", given_missed, tracks, 1);
     v.column("histories.last_later", last_later, tracks, 1);
+    v.column("histories.was_real", was_real, tracks, 1);
     v.column("histories.t", columns.t, total, 1, Values::any);
     v.column("histories.dt", columns.dt, total, 1);
     v.column("histories.real", columns.real, total, 1);
@@ -329,6 +332,7 @@ template <class Visitor> void visit_histories(Visitor& v, Histories& histories) 
             history.called = {given[i], label[i], share[i]};
             history.missed = given_missed[i];
             history.last_later = last_later[i];
+            history.was_real = was_real[i] != 0;
             for (std::size_t k = 0; k < count; ++k) history.entries.push_back(columns.at(at + k));
             at += count;
         }
