@@ -1,6 +1,6 @@
 """`python -m benchmarks corridor`: what a service of many cameras in one process costs, in real time.
 
-Simulated streams of detections go through a NATS server to `jeat-graph serve` with one configuration of all
+Simulated streams of detections go through a broker to `jeat-graph serve` with one configuration of all
 cameras, and the tracks and what is found of the corridor come back. Processor time and memory are those of
 the service alone, once it has warmed up.
 """
@@ -50,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--rate", type=positive, default=10.0, metavar="HZ", help="scans a second of each (10)")
     add("--flow", type=positive, default=1200.0, metavar="N", help="vehicles an hour (1200)")
     add("--duration", type=positive, default=120.0, metavar="S", help="so long is measured (120)")
+    add("--broker", choices=("nats", "mqtt"), default="nats", help="nats-server or Mosquitto (nats)")
     add("--seed", type=natural, default=0, metavar="N", help="of the traffic (0)")
 
 
@@ -65,18 +66,19 @@ def measure(args: argparse.Namespace) -> dict[str, Any]:
         "rate_hz": args.rate,
         "flow_per_h": args.flow,
         "duration_s": args.duration,
+        "broker": args.broker,
         "seed": args.seed,
     }
-    with tempfile.TemporaryDirectory() as folder, _server(Path(folder)) as port:
-        found = _measured(Path(folder), port, args)
+    with tempfile.TemporaryDirectory() as folder, _server(Path(folder), args.broker) as broker:
+        found = _measured(Path(folder), broker, args)
     return {"benchmark": "corridor", **provenance(settings, {}), **found}
 
 
-def _measured(folder: Path, port: int, args: argparse.Namespace) -> dict[str, Any]:
+def _measured(folder: Path, broker: str, args: argparse.Namespace) -> dict[str, Any]:
     names = [f"c{k:02d}" for k in range(args.cameras)]
     web = _free_port()
-    path = write_service(folder, names, f"nats://127.0.0.1:{port}", web)
-    sinks = [open_sink(f"nats://127.0.0.1:{port}/scans.{name}") for name in names]
+    path = write_service(folder, names, broker, web)
+    sinks = [open_sink(f"{broker}/scans.{name}") for name in names]
     command = [sys.executable, "-m", "jeat_graph", "serve", str(path)]
     with (folder / "log").open("w") as log:
         process = subprocess.Popen(command, stderr=log)
@@ -211,6 +213,7 @@ def tables(found: Mapping[str, Any]) -> dict[str, Table]:
     settings, memory = found["settings"], found["memory_mb"]
     row: dict[str, Cell] = {
         "cameras": settings["cameras"],
+        "broker": settings["broker"],
         "Hz": settings["rate_hz"],
         "vehicles/h": settings["flow_per_h"],
         "s": settings["duration_s"],
@@ -266,14 +269,19 @@ def _free_port() -> int:
 
 
 @contextlib.contextmanager
-def _server(folder: Path) -> Iterator[int]:
-    """Run a NATS server for as long as it is needed; yields its port."""
-    beside = Path(sys.executable).with_name("nats-server")
-    program = str(beside) if beside.exists() else shutil.which("nats-server")
+def _server(folder: Path, kind: str) -> Iterator[str]:
+    """Run a broker for as long as it is needed; yields the begin of its addresses."""
+    name = "nats-server" if kind == "nats" else "mosquitto"
+    beside = Path(sys.executable).with_name(name)
+    program = str(beside) if beside.exists() else shutil.which(name)
     if program is None:
-        raise ConfigError("this benchmark needs nats-server on the path")
+        raise ConfigError(f"this benchmark needs {name} on the path")
     port = _free_port()
     command = [program, "-a", "127.0.0.1", "-p", str(port), "-js", "-sd", str(folder / "broker")]
+    if kind == "mqtt":
+        settings = f"listener {port} 127.0.0.1\nallow_anonymous true\nmax_queued_messages 100000\n"
+        (folder / "mosquitto.conf").write_text(settings)
+        command = [program, "-c", str(folder / "mosquitto.conf")]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         end = time.monotonic() + _START_S
@@ -282,7 +290,7 @@ def _server(folder: Path) -> Iterator[int]:
                 if probe.connect_ex(("127.0.0.1", port)) == 0:
                     break
             time.sleep(0.05)
-        yield port
+        yield f"{kind}://127.0.0.1:{port}"
     finally:
         process.terminate()
         process.wait()

@@ -105,9 +105,9 @@ def _pair(name: str, drives: list[_Drive], start_m: float, gap_m: float) -> Came
         found = [(k, seen) for k, one in enumerate(drives) if (seen := _passage(one, place)) is not None]
         who = np.array([k for k, _ in found], dtype=np.int64)
         numbers = np.array([seen for _, seen in found], dtype=np.float64).reshape(-1, 3)
-        sides.append((who, numbers[:, 0] + clock, numbers[:, 1], numbers[:, 2].astype(np.int64)))
-    (first, *a), (second, *b) = sides
-    before, after = passages_of("A", *a), passages_of("B", *b)
+        lane = numbers[:, 2].astype(np.int64)
+        sides.append((who, passages_of(f"{place:.0f} m", numbers[:, 0] + clock, numbers[:, 1], lane)))
+    (first, before), (second, after) = sides
     return CameraPair(name, gap_m, 0.01 * gap_m, _OFFSET_S, before, after, first, second)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--interval", type=positive, metavar="S", help="of traffic: length of an interval of the tables (900)"
     )
     add("--od", metavar="FILE", help="of traffic: a table of `count --od`, drawn as a picture of flows")
+    add(
+        "--through",
+        metavar="DIR",
+        help="of traffic: a folder that `handover` wrote; its travel times, and its ways if there is no --od",
+    )
     add_tables(parser)
     add(
         "--detections",
@@ -66,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     check_writable(out)
     if is_traffic(Path(args.run_directory)):
         return _traffic(args, out)
-    for option in ("interval", "od"):
+    for option in ("interval", "od", "through"):
         if getattr(args, option) is not None:
             raise ConfigError(f"--{option} is of traffic: give a folder of `road`, or `count --crossings`")
     if args.gt is not None:
@@ -90,13 +96,19 @@ def _traffic(args: argparse.Namespace, out: Path) -> int:
     """Write the page of traffic."""
     from jeat_graph.drawing.page.passages import read_traffic
     from jeat_graph.drawing.page.traffic import render_traffic
+    from jeat_graph.drawing.page.travel_times import TravelTime, read_travel_times, read_ways
     from jeat_graph.io.files.atomic import open_atomic
 
     for option in ("gt", "detections"):
         if getattr(args, option) is not None:
             raise ConfigError(f"--{option} is of a run, and {args.run_directory} is traffic")
     traffic = read_traffic(Path(args.run_directory), None if args.od is None else Path(args.od))
-    page = render_traffic(traffic, _INTERVAL_S if args.interval is None else args.interval)
+    travel_times: list[TravelTime] = []
+    if args.through is not None:
+        travel_times = read_travel_times(Path(args.through))
+        if args.od is None:
+            traffic = replace(traffic, flows=read_ways(Path(args.through)))
+    page = render_traffic(traffic, _INTERVAL_S if args.interval is None else args.interval, travel_times)
     with open_atomic(out) as file:
         file.write(page)
     print(f"wrote {out}: {len(traffic.passed)} crossings, {out.stat().st_size / 1e6:.1f} MB")

@@ -13,6 +13,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.drawing.page.document import table_html
 from jeat_graph.drawing.page.head import page_head
 from jeat_graph.drawing.page.passages import CountedTraffic, OdFlow, Passed
+from jeat_graph.drawing.page.travel_times import TravelTime, travel_time_section
 from jeat_graph.eval.counting import LEAST_FLOW_S, interval_edges, observed_s, per_hour
 from jeat_graph.eval.tables import Cell, Table
 
@@ -30,12 +31,15 @@ _V85 = 0.85
 _LEAST_SPEEDS = 20
 
 
-def render_traffic(traffic: CountedTraffic, interval_s: float) -> str:
+def render_traffic(
+    traffic: CountedTraffic, interval_s: float, travel_times: Sequence[TravelTime] = ()
+) -> str:
     """Make the page; the same tables give the same bytes.
 
     Args:
         traffic: what is known.
         interval_s: length of an interval of the tables (s).
+        travel_times: of `handover`, if there are some.
     """
     first, last = traffic.bounds()
     edges = interval_edges(first, last, interval_s, [one.t for one in traffic.passed])
@@ -48,6 +52,7 @@ def render_traffic(traffic: CountedTraffic, interval_s: float) -> str:
         f'<p class="quiet">{escape(facts)}</p></header><main>',
         *(_line(traffic, name, edges) for name in lines),
         _speeds(traffic),
+        travel_time_section(travel_times, traffic) if travel_times else "",
         _od(traffic.flows),
         _left_out(traffic),
         "</main></body></html>",

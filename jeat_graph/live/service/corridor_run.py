@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 import threading
 import time
 from contextlib import ExitStack
@@ -33,8 +32,6 @@ from jeat_graph.live.transport.patience import UnconfirmedError
 #: Vehicles are decided about so often (s).
 _DECIDE_S = 2.0
 _SLICE_S = 0.1
-#: A thread gives way to another that waits after so long (s): each message goes through several threads.
-_SWITCH_S = 0.0005
 #: After a signal a camera's end is waited for so long (s).
 _END_S = 20.0
 _VERSION = 1
@@ -85,8 +82,6 @@ class CorridorService:
         with ExitStack() as stack:
             stack.enter_context(self.interrupts)
             stack.enter_context(log.of_libraries())
-            stack.callback(sys.setswitchinterval, sys.getswitchinterval())
-            sys.setswitchinterval(_SWITCH_S)
             if config.checkpoint is not None:
                 config.checkpoint.parent.mkdir(parents=True, exist_ok=True)
                 stack.enter_context(hold_file(config.checkpoint))

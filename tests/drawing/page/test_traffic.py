@@ -94,3 +94,42 @@ def test_a_table_of_crossings_is_a_page_too_and_what_it_lacks_is_said(tmp_path, 
     assert [int(b) - int(a) for a, b in pairwise(starts)] == [1, 1, 1]
     assert main(["report", str(table), "--gt", "gt.csv", "--out", str(out)]) == 2
     assert "--gt is of a run" in capsys.readouterr().err
+
+
+@pytest.fixture
+def through(tmp_path):
+    folder = tmp_path / "through"
+    folder.mkdir()
+    head = "from,to,begin,end,class,vehicles,expected,mean_s,low_s,high_s,median_s"
+    rows = [
+        f"A,B,{SEVEN},{SEVEN + 900},all,40,41.2,18.26,17.9,18.6,18.0",
+        f"A,B,{SEVEN},{SEVEN + 900},car,30,30.9,17.5,17.1,17.9,17.3",
+        f"A,B,{SEVEN + 900},{SEVEN + 1800},all,0,0.2,,,,",
+    ]
+    (folder / "travel_times.csv").write_text("\n".join([head, *rows]) + "\n")
+    ways = ["begin,end,from,to,vehicles,expected,low,high", "0,900,A,B,38,1,1,1", "0,900,A,A,5,1,1,1"]
+    ways += ["900,1800,A,B,2,1,1,1"]
+    (folder / "od.csv").write_text("\n".join(ways) + "\n")
+    return folder
+
+
+def test_travel_times_and_ways_of_a_handover_are_on_the_page(road, through, tmp_path):
+    out = tmp_path / "page.html"
+    assert main(["report", str(road), "--through", str(through), "--out", str(out)]) == 0
+    part = out.read_text().split("<h2>Travel times</h2>")[1]
+    rows = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in re.findall(r"<tr>(.*?)</tr>", part)]
+    first = ["27.11. 07:00", "27.11. 07:15", "all", "40", "41", "18.3", "17.9 to 18.6"]
+    assert first in rows
+    assert ["27.11. 07:15", "27.11. 07:30", "all", "0", "0"] in [row[:5] for row in rows]
+    assert ["A", "B", "40"] in rows
+    assert ["A", "A", "5"] in rows
+    assert part.count("<rect") == 1  # of the interval in which somebody was followed
+    # What was drawn is what the table says: the band from 17.9 to 18.6 s, the greatest being 1.1 × 18.6.
+    tall = float(re.search(r'<rect [^>]*height="([\d.]+)"', part)[1])
+    assert tall == pytest.approx((220 - 26 - 10) * 0.7 / (1.1 * 18.6), abs=0.1)
+
+
+def test_a_folder_without_travel_times_is_refused(road, tmp_path, capsys):
+    assert main(["report", str(road), "--through", str(road), "--out", str(tmp_path / "x.html")]) == 2
+    assert "travel_times.csv" in capsys.readouterr().err
+    assert not (tmp_path / "x.html").exists()
