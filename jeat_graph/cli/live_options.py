@@ -25,7 +25,8 @@ def add_duration(parser: argparse._ActionsContainer) -> None:
         "--duration",
         type=positive,
         metavar="S",
-        help="how long to record a live camera, in seconds (default: until Ctrl-C)",
+        help="how long to record a live camera, in seconds from its first picture, for which it has as long "
+        "and ten seconds at least (default: until Ctrl-C)",
     )
 
 

@@ -28,6 +28,8 @@ from jeat_graph.io.files.addresses import events_address, frames_address, is_liv
 
 #: Scans that may wait for whoever takes them; then the detectors wait, and the cameras drop.
 _MOST_WAITING = 8
+#: So long cameras may take to give something, however short they are looked at (s).
+_FIRST_S = 10.0
 
 
 def _never() -> bool:
@@ -190,7 +192,8 @@ def detect_live(
 ) -> Iterator[Scan]:
     """Yield what is found in cameras that are on, as it is found, until an end is asked for.
 
-    Times count from the beginning. `request.duration_s` ends it, too.
+    Times count from the beginning. `request.duration_s` ends it, too, counted from when all cameras have
+    given something; for that they have as long again, and ten seconds at least.
 
     Args:
         request: what to do.
@@ -206,7 +209,9 @@ def detect_live(
     begun = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(origin_s))
     say(f"time 0 is {begun}.{int(origin_s % 1.0 * 1000):03d}Z; Ctrl-C ends the recording")
     with LiveDetecting(request, say, lambda: wall() - origin_s) as live:
-        request = live.prepare(until)
+        first = _FirstLook(request.duration_s, live, until)
+        request = live.prepare(first.is_over)
+        first.check()
         if live.size_px is None:
             return
         prepared(request, live.size_px)
@@ -215,6 +220,31 @@ def detect_live(
             yield scan
         for line in live.dropped_lines():
             say(line)
+
+
+class _FirstLook:
+    """How long cameras may take until each has given something, if only so long is looked at them."""
+
+    def __init__(self, duration_s: float | None, live: LiveDetecting, until: Until) -> None:
+        self._wait_s = math.inf if duration_s is None else max(duration_s, _FIRST_S)
+        self._end = time.monotonic() + self._wait_s
+        self._live, self._until = live, until
+        self._late: list[str] = []
+
+    def is_over(self) -> bool:
+        """Whether to wait no longer: somebody ended it, or a camera has given nothing in that time."""
+        if time.monotonic() >= self._end:
+            self._late = [one.name for one in self._live.statuses if one.taken == 0]
+        return bool(self._late) or self._until()
+
+    def check(self) -> None:
+        """Refuse to go on without a camera.
+
+        Raises:
+            DataError: names those that have given nothing.
+        """
+        if self._late and not self._until():
+            raise DataError(f"nothing came in {self._wait_s:g} s from {' and '.join(self._late)}")
 
 
 def live_detections(scans: Iterator[Scan], request: DetectRequest) -> Detections:

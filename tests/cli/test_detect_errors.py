@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+
 import numpy as np
 import pytest
 
@@ -118,3 +120,28 @@ def test_a_file_of_settings_is_named(recording, capsys, text, more, says):
 def test_the_longest_window_and_means_of_three_colours_are_taken(recording):
     wide = ["--detection-set", "events.window_s=2", "--detection-set", "model_frames.mean=[1, 2, 3]"]
     assert main(command(recording, *wide)) == 0
+
+
+def test_a_camera_that_never_answers_ends_a_recording_of_a_given_length(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("jeat_graph.detection.live_detecting._FIRST_S", 0.3)
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))  # nobody listens there
+        camera = f"rtsp://user:canary@127.0.0.1:{silent.getsockname()[1]}/x"
+        out = tmp_path / "found.csv"
+        code = main(
+            [
+                "detect",
+                "--frames",
+                camera,
+                "--detector-frames",
+                "motion",
+                "--duration",
+                "0.2",
+                "--out",
+                str(out),
+            ]
+        )
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert code == 2
+    assert last == f"jeat-graph detect: nothing came in 0.3 s from {camera.replace('user:canary', '***')}"
+    assert not out.exists()

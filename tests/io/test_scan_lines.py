@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.notes import listening
 from jeat_graph.data.tables.reading import Reading
 from jeat_graph.io.streams.scan_lines import batch_of, read_batches
 from jeat_graph.io.streams.stream_reading import StreamReading
@@ -333,3 +334,10 @@ def test_a_scan_whose_rows_do_not_fit_is_passed_over_where_errors_are():
     found = batches(rows, bad=lambda error: said.append(error.line))
     assert [batch.t for batch in found] == [1.0]
     assert said == [2, 5]
+
+
+def test_what_a_table_says_of_its_detectors_is_not_passed_over_in_silence():
+    said = []
+    with listening(said.append):
+        batches("t,sensor,left,top,width,height,sensor.even_score\n0,rgb,1,2,3,4,.3\n")
+    assert [line.split(":")[0] for line in said] == ["sensor.even_score"]
