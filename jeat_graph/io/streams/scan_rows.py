@@ -23,8 +23,8 @@ from jeat_graph.data.column_names import (
     usual_names,
 )
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.notes import note
 from jeat_graph.data.frame_columns import ASIDE
+from jeat_graph.data.notes import note
 from jeat_graph.data.tables.file_table import advice_on
 from jeat_graph.data.tables.spreadsheets import unguarded
 from jeat_graph.io.streams.scan_batch import ScanBatch, Trying
@@ -84,7 +84,7 @@ def csv_columns(header: str, name: str, at: int) -> CsvForm:
     told = [column for column in columns if column.startswith("sensor.")]
     if told:
         note(
-            f"{', '.join(told)}: a stream's tracker is made before its first row, so this is not read; say it "
+            f"{', '.join(told)}: a stream's tracker is made before its first row: this is not read; say it "
             "with --set sensors.NAME.… or --detector-frames and its like"
         )
     known = [column for column in (*needed, "sensor", *_OPTIONAL) if column in columns]
