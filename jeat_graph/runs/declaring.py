@@ -109,6 +109,9 @@ def _declare_sensors(config: Config, recordings: Sequence[Detections]) -> tuple[
             stated = "" if known.rate_hz == SensorConfig().rate_hz else f", not at {known.rate_hz:g}"
             notes.append(f"sensor {name!r} scans at {rate:.3g} Hz{stated}")
         sensors[name] = sensor
+    if config.sensors and sensors and not sensors.keys() & config.sensors.keys():
+        idle, seen = (", ".join(repr(name) for name in sorted(names)) for names in (config.sensors, sensors))
+        notes.append(f"warning: what the configuration says of {idle} has no effect: the sensors are {seen}")
     return replace(config, sensors=sensors), notes
 
 

@@ -38,7 +38,7 @@ def test_every_preset_loads_and_survives_a_round_trip(name, tmp_path):
 
 
 def test_the_presets_of_the_contract_exist():
-    assert {"default", "paper"} <= set(preset_names())
+    assert {"default", "highway", "paper"} <= set(preset_names())
 
 
 @pytest.mark.parametrize(

@@ -140,6 +140,13 @@ def test_what_a_declared_sensor_says_itself_counts():
     assert sensor == SensorConfig(rate_hz=20.0, even_score=0.4)
 
 
+@pytest.mark.parametrize(("names", "idle"), [(("cam",), True), (("rgb",), False), (("cam", "evt"), False)])
+def test_settings_of_sensors_that_are_not_there_are_named(names, idle):
+    notes = fit_input(load_config("highway"), *[camera(0.0, name=name) for name in names])[1]
+    line = "warning: what the configuration says of 'evt', 'rgb' has no effect: the sensors are 'cam'"
+    assert (line in notes) == idle
+
+
 def test_who_refuses_sensors_that_are_not_declared_gets_none_and_keeps_the_rates():
     strict = load_config("default", ["sensors.radar.rate_hz=10", "input.undeclared=refuse"])
     assert fit_input(strict, camera(0.0), camera(0.0, name="radar"))[0].sensors == strict.sensors
