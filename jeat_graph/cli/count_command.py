@@ -89,6 +89,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--site-table", metavar="ID", default="jeat-graph", help="the table that has the sites (%(default)s)")
     add(
+        "--site-places",
+        metavar="FILE.csv",
+        help="places of the stations (station, latitude, longitude, bearing): with --datex, also write the "
+        "table of sites beside it (FILE.sites.xml)",
+    )
+    add(
         "--road",
         metavar="DIR",
         help="output of `road` for the same lines, for the lanes and speeds of stations",
@@ -100,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.eval import counting
     from jeat_graph.eval.load import recording_span, tables_of
     from jeat_graph.eval.passing import passages
+    from jeat_graph.io.exports.datex2_sites import read_places
     from jeat_graph.io.tables.table_writer import write_columns
     from jeat_graph.io.tables.trajectories_io import read_trajectories
 
@@ -107,6 +114,7 @@ def run(args: argparse.Namespace) -> int:
     names = [line.name for line in lines] + [zone.name for zone in zones]
     _check_places(args, len(lines), len(names))
     publication = _publication(args)
+    places_on_map = None if args.site_places is None else read_places(args.site_places)
     clock_s(args.begin)  # refused before anything is read
     tables = tables_of(Path(args.source))
     kind = "smoothed" if "smoothed" in tables else "causal"
@@ -139,7 +147,7 @@ def run(args: argparse.Namespace) -> int:
         if args.stations:
             write_columns(with_clock(station_columns(records), args.begin), args.stations)
         if publication is not None:
-            write_publication(records, span[1], publication, args.datex)
+            write_publication(records, span[1], publication, args.datex, places_on_map)
     if args.out:
         write_columns(with_clock(_columns(counts, Count), args.begin), args.out)
         print(f"wrote {args.out}: {len(found)} crossings ({kind} tracks)", file=sys.stderr)
@@ -196,7 +204,7 @@ def _publication(args: argparse.Namespace) -> PublicationOptions | None:
     """
     if args.datex is not None:
         return PublicationOptions(args.begin, args.publisher, args.publication_time, args.site_table)
-    for option in ("publisher", "publication_time"):
+    for option in ("publisher", "publication_time", "site_places"):
         if getattr(args, option) is not None:
             raise ConfigError(f"--{option.replace('_', '-')} says nothing without --datex")
     return None

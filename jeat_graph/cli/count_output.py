@@ -20,6 +20,7 @@ from jeat_graph.io.tables.rounding import round_decimals
 if TYPE_CHECKING:
     from jeat_graph.eval.passing import LineCrossing
     from jeat_graph.io.exports.datex2 import Publication
+    from jeat_graph.io.exports.datex2_sites import SitePlace
 
 #: Two letters of the country, and a name.
 _PUBLISHER = re.compile(r"[A-Za-z]{2}:\S.*")
@@ -172,7 +173,11 @@ def _zoned(text: str) -> datetime:
 
 
 def write_publication(
-    records: Sequence[StationRecord], last_s: float, publication: PublicationOptions, path: str | Path
+    records: Sequence[StationRecord],
+    last_s: float,
+    publication: PublicationOptions,
+    path: str | Path,
+    places: Mapping[str, SitePlace] | None = None,
 ) -> None:
     """Write records as DATEX II.
 
@@ -181,8 +186,13 @@ def write_publication(
         last_s: when the recording ends, on the clock (s since 1970).
         publication: what the user says of it.
         path: the file.
+        places: of the stations; with them the table of sites is written beside the data (`sites_beside`).
+
+    Raises:
+        DataError: a site has no place.
     """
     from jeat_graph.io.exports.datex2 import SiteInterval, write_datex2
+    from jeat_graph.io.exports.datex2_sites import write_sites
 
     zone = _date(str(publication.begin)).tzinfo
     intervals = [
@@ -200,7 +210,14 @@ def write_publication(
         )
         for one in records
     ]
+    if places is not None:  # first, for it refuses what has no place
+        write_sites(intervals, places, publication.made(last_s), sites_beside(path))
     write_datex2(intervals, publication.made(last_s), path)
+
+
+def sites_beside(path: str | Path) -> Path:
+    """Return where the table of sites of a file of data is written: `measured.sites.xml`."""
+    return Path(path).with_suffix(".sites.xml")
 
 
 def on_road(folder: Path, found: Sequence[LineCrossing]) -> tuple[list[str], list[float]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -258,6 +260,25 @@ def test_stations_as_measured_data_of_datex_ii(run, tmp_path, monkeypatch):
     text = (tmp_path / "d.xml").read_text()
     assert "<com:publicationTime>2026-11-28T00:00:00+00:00<" in text
     assert 'targetClass="roa:MeasurementSiteTable" id="bridges"' in text
+
+
+def test_the_table_of_sites_is_written_beside_the_data(run, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "places.csv").write_text("station,latitude,longitude,bearing\ngate,50.7353,7.1002,\n")
+    words = ["count", str(run), "--line", "gate=0,50,100,50", "--interval", "1", *DATEX]
+    assert main([*words, "--site-places", "places.csv", "--site-table", "bridges"]) == 0
+    data, sites = (tmp_path / name for name in ("d.xml", "d.sites.xml"))
+    named = set(re.findall(r'MeasurementSite" id="([^"]+)"', data.read_text()))
+    told = set(re.findall(r'<roa:measurementSite id="([^"]+)"', sites.read_text()))
+    assert named == told != set()
+    assert '<roa:measurementSiteTable id="bridges" version="1">' in sites.read_text()
+    data.unlink()
+    sites.unlink()
+    (tmp_path / "places.csv").write_text("station,latitude,longitude\nbridge,50.7353,7.1002\n")
+    assert main([*words, "--site-places", "places.csv"]) == 2
+    assert "has no place: bridge have one" in capsys.readouterr().err
+    assert not data.exists()
+    assert not sites.exists()
 
 
 @pytest.mark.parametrize(

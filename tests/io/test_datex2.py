@@ -10,11 +10,13 @@ from xml.etree import ElementTree
 
 import pytest
 
+from jeat_graph.data.errors import DataError
 from jeat_graph.io.exports.datex2 import Publication, SiteInterval, write_datex2
+from jeat_graph.io.exports.datex2_sites import SitePlace, place_of, read_places, write_sites
 
 BASE = "http://datex2.eu/schema/3/"
 XSI = "{http://www.w3.org/2001/XMLSchema-instance}type"
-NAMES = {"com": f"{BASE}common", "roa": f"{BASE}roadTrafficData"}
+NAMES = {"com": f"{BASE}common", "roa": f"{BASE}roadTrafficData", "loc": f"{BASE}locationReferencing"}
 
 
 class Part(NamedTuple):
@@ -95,9 +97,52 @@ TYPES = {
         Part("roa:timeValue", "dateTime", 0),
         Part("roa:period", "com:Period", 0),
     ],
+    "roa:MeasurementSiteTablePublication": [
+        Part("com:feedDescription", "-", 0),
+        Part("com:feedType", "string", 0),
+        Part("com:publicationTime", "dateTime"),
+        Part("com:publicationCreator", "com:InternationalIdentifier"),
+        Part("roa:headerInformation", "com:HeaderInformation"),
+        Part("roa:measurementSiteTable", "roa:MeasurementSiteTable", 1, math.inf),
+    ],
+    "roa:MeasurementSiteTable": [
+        Part("roa:measurementSiteTableIdentification", "string", 0),
+        Part("roa:measurementSite", "roa:MeasurementSite", 1, math.inf),
+        Part("roa:informationManager", "com:InternationalIdentifier", 0),
+    ],
+    "roa:MeasurementSite": [
+        *(Part(f"roa:measurement{name}", "-", 0) for name in ("SiteRecordVersionTime", "EquipmentReference")),
+        Part("roa:measurementEquipmentTypeUsed", "-", 0),
+        Part("roa:measurementSiteName", "com:MultilingualString", 0),
+        Part("roa:measurementSiteNumberOfLanes", "nonNegativeInteger", 0),
+        Part("roa:measurementSiteIdentification", "string", 0),
+        Part("roa:measurementSpecificCharacteristics", "roa:indexedCharacteristics", 0, math.inf),
+        Part("roa:measurementSiteLocation", "[loc:LocationReference]"),
+        Part("roa:informationManagerOverride", "com:InternationalIdentifier", 0),
+    ],
+    "roa:indexedCharacteristics": [Part("roa:measurementSpecificCharacteristics", "roa:Characteristics")],
+    "roa:Characteristics": [
+        *(Part(f"roa:{name}", "-", 0) for name in ("accuracy", "computationMethod")),
+        *(Part(f"roa:{name}", "-", 0) for name in ("defaultMeasurementHeight", "measurementSide")),
+        Part("roa:period", "float", 0),
+        Part("roa:smoothingFactor", "float", 0),
+        Part("roa:specificMeasurementValueType", "measured"),
+        Part("roa:specificVehicleCharacteristics", "com:VehicleCharacteristics", 0),
+        Part("roa:specificLane", "-", 0, math.inf),
+    ],
+    "com:MultilingualString": [Part("com:values", "com:values")],
+    "com:values": [Part("com:value", "com:inLanguage", 1, math.inf)],
+    "com:inLanguage": [],
+    "loc:PointLocation": [Part("loc:pointByCoordinates", "loc:PointByCoordinates", 0)],
+    "loc:PointByCoordinates": [
+        Part("loc:bearing", "degrees", 0),
+        Part("loc:pointCoordinates", "loc:PointCoordinates"),
+    ],
+    "loc:PointCoordinates": [Part("loc:latitude", "float"), Part("loc:longitude", "float")],
     "com:Period": [Part("com:startOfPeriod", "dateTime", 0), Part("com:endOfPeriod", "dateTime", 0)],
 }
 EXTENDS = {
+    "[loc:LocationReference]": {"loc:PointLocation"},
     "[roa:PhysicalQuantity]": {"roa:SinglePhysicalQuantity"},
     "[roa:BasicData]": {
         "roa:TrafficFlow",
@@ -113,6 +158,14 @@ ATTRIBUTES = {
         {"lang": r"[a-z]{2}", "modelBaseVersion": "3"},
         {"lang", "modelBaseVersion"},
     ),
+    "roa:MeasurementSiteTablePublication": (
+        {"lang": r"[a-z]{2}", "modelBaseVersion": "3"},
+        {"lang", "modelBaseVersion"},
+    ),
+    "roa:MeasurementSiteTable": ({"id": ".+", "version": ".+"}, {"id", "version"}),
+    "roa:MeasurementSite": ({"id": ".+", "version": ".+"}, {"id", "version"}),
+    "roa:indexedCharacteristics": ({"index": r"\d+"}, {"index"}),
+    "com:inLanguage": ({"lang": r"[a-z]{2}"}, set()),
     "roa:table": (
         {"targetClass": "roa:MeasurementSiteTable", "id": ".+", "version": ".+"},
         {"id", "targetClass"},
@@ -128,6 +181,8 @@ SIMPLE = {
     "dateTime": r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:\d\d)?",
     "float": r"-?\d+(\.\d+)?(e[+-]?\d+)?",
     "nonNegativeInteger": r"\d+",
+    "degrees": r"\d|[1-9]\d|[12]\d\d|3[0-5]\d",
+    "measured": "trafficFlow|trafficConcentration|trafficHeadway|trafficSpeed",
     "status": "real|securityExercise|technicalExercise|test",
     "meaning": "beginTime|endTime|middleTime",
     "vehicle": "anyVehicle|bicycle|bus|car|lorry|motorcycle|trailer|tram|van|other",
@@ -187,7 +242,8 @@ def written(tmp_path, *intervals):
     assert root.tag == f"{{{BASE}d2Payload}}payload"
     assert root.attrib[XSI] == "roa:MeasuredDataPublication"
     # Names in `xsi:type` are read by the prefixes of the file.
-    assert {f'xmlns:{prefix}="{space}"' for prefix, space in NAMES.items()} <= set(path.read_text().split())
+    spaces = {f'xmlns:{prefix}="{NAMES[prefix]}"' for prefix in ("com", "roa")}
+    assert spaces <= set(path.read_text().split())
     check(root, "roa:MeasuredDataPublication")
     return root
 
@@ -262,3 +318,52 @@ def test_the_check_of_the_structure_finds_what_is_wrong(tmp_path, spoil):
     spoil(root)
     with pytest.raises(AssertionError):
         check(root, "roa:MeasuredDataPublication")
+
+
+def test_the_table_of_sites_is_as_the_schema_has_it_and_of_the_data(tmp_path):
+    data = written(tmp_path, interval(car=2, truck=1), interval(35))
+    places = {"gate": SitePlace(50.7353, 7.1002), "gate-left": SitePlace(50.7354, 7.1003, 271.6)}
+    path = tmp_path / "sites.xml"
+    write_sites([interval(car=2, truck=1), interval(35)], places, PUBLICATION, path)
+    root = ElementTree.parse(path).getroot()
+    assert root.attrib[XSI] == "roa:MeasurementSiteTablePublication"
+    assert f'xmlns:loc="{NAMES["loc"]}"' in path.read_text()
+    check(root, "roa:MeasurementSiteTablePublication")
+    (site,) = root.findall("roa:measurementSiteTable/roa:measurementSite", NAMES)
+    assert site.attrib["id"] == "gate-left"
+    assert values(root, ".//loc:pointCoordinates/*") == ["50.7354000", "7.1003000"]
+    assert values(root, ".//loc:bearing") == ["272"]
+    # Each index of the data is explained.
+    used = {one.attrib["index"] for one in data.findall(".//roa:physicalQuantity[@index]", NAMES)}
+    told = {one.attrib["index"] for one in site.findall("roa:measurementSpecificCharacteristics", NAMES)}
+    assert used == told == set("123456")
+    kinds = values(root, ".//roa:specificVehicleCharacteristics/com:vehicleType")
+    assert kinds == ["anyVehicle", "car", "lorry"]
+    assert set(values(root, ".//roa:period")) == {"300"}
+
+
+def test_places_are_read_and_found_by_the_longest_name(tmp_path):
+    path = tmp_path / "places.csv"
+    path.write_text("station,latitude,longitude,bearing\nnorth,50,7,\nnorth-left,51,8,90\n")
+    places = read_places(path)
+    assert place_of("north-left-lane1", places) == SitePlace(51.0, 8.0, 90.0)
+    assert place_of("north-right", places).latitude == 50.0
+    with pytest.raises(DataError, match="'south' has no place"):
+        place_of("south", places)
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("a,91,7,", "latitude and"),
+        ("a,50,7,400", "bearing"),
+        ("north,50,7,", "twice"),
+        ("a,x,7,", "latitude"),
+    ],
+)
+def test_places_that_are_none_are_refused(row, words, tmp_path):
+    path = tmp_path / "places.csv"
+    path.write_text(f"station,latitude,longitude,bearing\nnorth,50,7,\n{row}\n")
+    with pytest.raises(DataError, match=words) as error:
+        read_places(path)
+    assert ":3: " in str(error.value)

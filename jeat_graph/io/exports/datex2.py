@@ -24,17 +24,16 @@ from xml.etree import ElementTree
 
 from jeat_graph.io.files.atomic import open_atomic
 
-_SCHEMA = "http://datex2.eu/schema/3"
+SCHEMA = "http://datex2.eu/schema/3"
 _ROOT = {
-    "xmlns:d2": f"{_SCHEMA}/d2Payload",
-    "xmlns:com": f"{_SCHEMA}/common",
-    "xmlns:roa": f"{_SCHEMA}/roadTrafficData",
+    "xmlns:d2": f"{SCHEMA}/d2Payload",
+    "xmlns:com": f"{SCHEMA}/common",
+    "xmlns:roa": f"{SCHEMA}/roadTrafficData",
     "xmlns:xsi": "http://www.w3.org/2001/XMLSchema-instance",
-    "xsi:type": "roa:MeasuredDataPublication",
     "lang": "en",
     "modelBaseVersion": "3",
 }
-_VERSION = "1"
+SITE_VERSION = "1"
 #: Types of vehicles (`VehicleTypeEnum`) by the names that detectors give; the others are `other`.
 _TYPES = {
     "car": "car",
@@ -49,6 +48,8 @@ _TYPES = {
     "tram": "tram",
 }
 _OTHER, _ANY = "other", "anyVehicle"
+#: Index of the first flow by type of vehicle.
+FIRST_TYPE = 5
 #: Decimal places of shares, times and speeds.
 _PLACES = 3
 
@@ -110,18 +111,40 @@ def write_datex2(intervals: Sequence[SiteInterval], publication: Publication, pa
     Raises:
         DataError: it cannot be written.
     """
-    root = ElementTree.Element("d2:payload", _ROOT)
-    _text(root, "com:publicationTime", _time(publication.time))
-    creator = ElementTree.SubElement(root, "com:publicationCreator")
-    _text(creator, "com:country", publication.country)
-    _text(creator, "com:nationalIdentifier", publication.publisher)
-    table = {"targetClass": "roa:MeasurementSiteTable", "id": publication.table, "version": _VERSION}
+    root = root_of("MeasuredDataPublication")
+    add_publication(root, publication)
+    table = {"targetClass": "roa:MeasurementSiteTable", "id": publication.table, "version": SITE_VERSION}
     ElementTree.SubElement(root, "roa:measurementSiteTableReference", table)
     header = ElementTree.SubElement(root, "roa:headerInformation")
-    _text(header, "com:informationStatus", "real")
-    types = sorted({_type(name) for one in intervals for name in one.by_class})
+    add_text(header, "com:informationStatus", "real")
+    types = types_of(intervals)
     for one in intervals:
         _add_site(root, one, types)
+    write_payload(root, path)
+
+
+def root_of(kind: str, more: Mapping[str, str] | None = None) -> ElementTree.Element:
+    """Return the root of a publication of a kind, with further name spaces."""
+    spaces = {name: value for name, value in _ROOT.items() if name.startswith("xmlns:")} | dict(more or {})
+    others = {name: value for name, value in _ROOT.items() if name not in spaces}
+    return ElementTree.Element("d2:payload", {**spaces, "xsi:type": f"roa:{kind}", **others})
+
+
+def add_publication(root: ElementTree.Element, publication: Publication) -> None:
+    """Add when it is published, and by whom."""
+    add_text(root, "com:publicationTime", _time(publication.time))
+    creator = ElementTree.SubElement(root, "com:publicationCreator")
+    add_text(creator, "com:country", publication.country)
+    add_text(creator, "com:nationalIdentifier", publication.publisher)
+
+
+def types_of(intervals: Sequence[SiteInterval]) -> list[str]:
+    """Return the types of vehicles that have flows of their own, in the order of their indices."""
+    return sorted({_type(name) for one in intervals for name in one.by_class})
+
+
+def write_payload(root: ElementTree.Element, path: str | Path) -> None:
+    """Write a publication, whole or not at all."""
     ElementTree.indent(root)
     with open_atomic(path) as file:
         file.write('<?xml version="1.0" encoding="UTF-8"?>\n')
@@ -131,7 +154,7 @@ def write_datex2(intervals: Sequence[SiteInterval], publication: Publication, pa
 def _add_site(root: ElementTree.Element, one: SiteInterval, types: Sequence[str]) -> None:
     """Add the quantities of a site and interval, in the order of the schema."""
     site = ElementTree.SubElement(root, "roa:siteMeasurements")
-    place = {"targetClass": "roa:MeasurementSite", "id": one.site, "version": _VERSION}
+    place = {"targetClass": "roa:MeasurementSite", "id": one.site, "version": SITE_VERSION}
     ElementTree.SubElement(site, "roa:measurementSiteReference", place)
     _add_flow(site, 1, one, one.count, _ANY)
     for index, kind, outer, inner, value in (
@@ -141,25 +164,25 @@ def _add_site(root: ElementTree.Element, one: SiteInterval, types: Sequence[str]
     ):
         if not math.isnan(value):
             measured = ElementTree.SubElement(_basic_data(site, index, kind), outer)
-            _text(measured, inner, f"{round(value, _PLACES):g}")
+            add_text(measured, inner, f"{round(value, _PLACES):g}")
     counts = dict.fromkeys(types, 0)
     for name, count in one.by_class.items():
         counts[_type(name)] += count
-    for index, kind in enumerate(types, 5):
+    for index, kind in enumerate(types, FIRST_TYPE):
         _add_flow(site, index, one, counts[kind], kind)
     default = ElementTree.SubElement(site, "roa:measurementTimeDefault")
-    _text(default, "roa:timeMeaning", "endTime")
-    _text(default, "roa:timeValue", _time(one.end))
+    add_text(default, "roa:timeMeaning", "endTime")
+    add_text(default, "roa:timeValue", _time(one.end))
     period = ElementTree.SubElement(default, "roa:period")
-    _text(period, "com:startOfPeriod", _time(one.begin))
-    _text(period, "com:endOfPeriod", _time(one.end))
+    add_text(period, "com:startOfPeriod", _time(one.begin))
+    add_text(period, "com:endOfPeriod", _time(one.end))
 
 
 def _add_flow(site: ElementTree.Element, index: int, one: SiteInterval, count: int, kind: str) -> None:
     """Add the flow of a type of vehicles; of an interval that was not watched it is an error."""
     data = _basic_data(site, index, "TrafficFlow")
     vehicles = ElementTree.SubElement(data, "roa:forVehiclesWithCharacteristicsOf")
-    _text(vehicles, "com:vehicleType", kind)
+    add_text(vehicles, "com:vehicleType", kind)
     watched = not math.isnan(one.flow_per_hour)
     about = {
         "numberOfInputValuesUsed": str(count),
@@ -167,10 +190,10 @@ def _add_flow(site: ElementTree.Element, index: int, one: SiteInterval, count: i
     }
     flow = ElementTree.SubElement(data, "roa:vehicleFlow", about)
     if not watched:
-        _text(flow, "com:dataError", "true")
+        add_text(flow, "com:dataError", "true")
     share = count / one.count if one.count else 0.0
     rate = round(one.flow_per_hour * share) if watched else 0
-    _text(flow, "com:vehicleFlowRate", str(rate))
+    add_text(flow, "com:vehicleFlowRate", str(rate))
 
 
 def _basic_data(site: ElementTree.Element, index: int, kind: str) -> ElementTree.Element:
@@ -180,7 +203,8 @@ def _basic_data(site: ElementTree.Element, index: int, kind: str) -> ElementTree
     return ElementTree.SubElement(quantity, "roa:basicData", {"xsi:type": f"roa:{kind}"})
 
 
-def _text(parent: ElementTree.Element, name: str, text: str) -> None:
+def add_text(parent: ElementTree.Element, name: str, text: str) -> None:
+    """Add an element that holds a text."""
     ElementTree.SubElement(parent, name).text = text
 
 
