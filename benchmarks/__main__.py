@@ -32,6 +32,7 @@ KINDS = {
     "dsec-mot": (_TABLES, "trackers on DSEC-MOT: events of a driving car"),
     "tumtraf": (_TABLES, "trackers on TUMTraf: cameras over a road, boxes in OpenLABEL"),
     "real": (_TABLES, "trackers on all recordings of a folder"),
+    "unions": ("benchmarks.unions", "drawn detectors joined, against the best of them alone"),
     "simulated": (
         "benchmarks.simulated",
         "trackers on simulated highways, streets, squares, and with odd detectors",
