@@ -2,8 +2,8 @@
 
 Each pass (forward in time, backward, with other constants) says which of its tracks took each detection. Two
 successive detections of one sensor belong together where nearly all passes say so; what that joins is a
-piece. Pieces of different sensors that lie beside each other in time are one where most passes give both to
-one track.
+piece. Pieces of different sensors that lie beside each other in time are one where the causal pass gives both
+to one track: no cover of successive pieces could say so otherwise.
 """
 
 from __future__ import annotations
@@ -106,18 +106,20 @@ def _numbered(labels: IntArray) -> IntArray:
 
 
 def _with_sensors_together(seen: SeenBoxes, takers: IntArray, piece: IntArray) -> IntArray:
-    """Return pieces (N,) with those of different sensors joined that most passes give to one track."""
+    """Return pieces (N,) with those of different sensors joined that the first pass gives to one track.
+
+    Those go first of which more passes say so, and in more detections.
+    """
     if len(np.unique(seen.sensor)) < 2:
         return piece
     own = _numbered(piece)
     order = np.argsort(own, kind="stable")
     ends = np.searchsorted(own[order], np.arange(own.max() + 2))
     members = [order[a:b] for a, b in pairwise(ends)]
-    candidates = _beside(seen, takers, own)
     found = []
-    for x, y in candidates:
-        share, number = _agreement(seen, takers, members[x], members[y])
-        if share >= 0.5:
+    for x, y in _beside(seen, takers[:1], own):
+        if _agreement(seen, takers[:1], members[x], members[y])[0] > 0.0:
+            share, number = _agreement(seen, takers, members[x], members[y])
             found.append((-share, -number, x, y))
     group = {k: [k] for k in range(len(members))}
     of = list(range(len(members)))

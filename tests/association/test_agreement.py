@@ -20,11 +20,12 @@ def test_two_of_three_are_no_eight_tenths():
     assert pieces(seen, takers, 0.6).tolist() == [0, 0]
 
 
-def test_boxes_of_two_sensors_are_one_piece_where_half_of_the_passes_say_so():
+def test_boxes_of_two_sensors_are_one_piece_where_the_causal_pass_says_so():
     t = np.repeat(np.arange(4.0), 2) / 10
     sensor = np.tile([0, 1], 4)
     apart = np.array([1, 2] * 4)
     assert pieces(SeenBoxes(t, sensor), np.array([[5] * 8, apart]), 0.8).tolist() == [0] * 8
+    assert pieces(SeenBoxes(t, sensor), np.array([apart, [5] * 8]), 0.8).tolist() == [0, 1] * 4
     assert pieces(SeenBoxes(t, sensor), np.array([apart, apart]), 0.8).tolist() == [0, 1] * 4
 
 

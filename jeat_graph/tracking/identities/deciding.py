@@ -24,16 +24,20 @@ AGREED = 0.8
 LONGEST_GAP_S = 10.0
 #: A piece is left out of the cover whose posterior is less than this, in log odds.
 LEAST_LOG_ODDS = 0.0
+#: A piece of fewer detections goes with its causal track: what joins it tells next to nothing. Measured.
+LEAST_DETECTIONS = 10
 #: Parts of covers that lose less than this (nats) are taken as the causal identities have them. Measured.
-TIE = 4.0
+TIE = 6.0
 # Posteriors are kept from 0 and 1.
 _LEAST = 0.005
 # Detections at the end of a piece that its state there is estimated from.
 _HITS = 30
 # Pairs of pieces that could be one object: distance (sizes, and sizes/s of the gap), difference of ln size.
 _REACH, _REACH_PER_S, _MOST_LOG_SIZE = 1.0, 4.0, 1.5
-# Less gain is no link, before births, gaps and votes count; and of the links that are drawn.
-_LEAST_RATIO, _LEAST_DRAWN = -12.0, -8.0
+# Less gain is no link, before births, gaps and votes count; causal ones stay, and gain at least the second.
+_LEAST_RATIO, _LEAST_CAUSAL = -12.0, -30.0
+# Less gain is not drawn.
+_LEAST_DRAWN = -8.0
 # A box lies at the rim of the picture that is nearer to the edge than so much of its size.
 _RIM = 0.5
 _SAMPLES, _SWEEPS = 200, 10
@@ -89,8 +93,9 @@ def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelCon
     piece = agreement.pieces(agreement.SeenBoxes(seen.t, seen.sensor), takers, AGREED)
     odds = np.full(int(piece.max(initial=-1)) + 1, -np.inf)
     np.maximum.at(odds, piece, 0.5 * (_log_odds(passes[0].real) + _log_odds(backward.real)))
+    told = (odds > LEAST_LOG_ODDS) & (np.bincount(piece, minlength=len(odds)) >= LEAST_DETECTIONS)
     number = np.full(len(odds), -1)
-    number[odds > LEAST_LOG_ODDS] = np.arange((odds > LEAST_LOG_ODDS).sum())
+    number[told] = np.arange(told.sum())
     piece = number[piece] if len(piece) else piece
     if not (piece >= 0).any():
         nothing = np.zeros(0)
@@ -126,18 +131,31 @@ def _joined(
     pieces = Pieces(
         seen.t[first], seen.t[last], *(_at_rim(seen.boxes[k], scene.picture) for k in (first, last))
     )
-    tail, head = _candidates(seen, first, last)
+    made = agreement.votes_between(piece, takers[:1], first)[:2]
+    tail, head = _with_causal(_candidates(seen, first, last), made, seen.t[first], seen.t[last])
     ends = ends_of(seen, _columns(members, from_end=True), scene, c)
     begun = beginnings_of(seen, _columns(members, from_end=False), scene, c)
     links = Links(tail, head, log_ratio(ends, tail, begun, head, scene, c))
-    links = links.where(links.gain > _LEAST_RATIO)
+    causal = _of_pairs(links, *made, np.ones(len(made[0]), dtype=np.int64), len(members)) > 0
+    links = links._replace(gain=np.where(causal, np.maximum(links.gain, _LEAST_CAUSAL), links.gain))
+    possible = causal | (links.gain > _LEAST_RATIO)
+    links, causal = links.where(possible), causal[possible]
     voted = agreement.votes_between(piece, takers, first)
     votes = _of_pairs(links, *voted, len(members)) / len(takers)
     looked = recording.looked
     step = float(np.median(np.diff(looked))) if len(looked) > 1 else c.first_period_s
     found = join(pieces, links, votes, (float(looked[0]), float(looked[-1])), step)
-    causal = _of_pairs(links, *agreement.votes_between(piece, takers[:1], first), len(members)) > 0
     return found, _only_links(links, causal, len(members))
+
+
+def _with_causal(
+    near: tuple[IntArray, IntArray], made: tuple[IntArray, IntArray], begins: FloatArray, ends: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Return pairs of pieces, and those that follow each other on a causal track, in order, each once."""
+    follows = begins[made[1]] > ends[made[0]]
+    tail, head = (np.concatenate([a, b[follows]]) for a, b in zip(near, made, strict=True))
+    code = np.unique(tail * len(begins) + head)
+    return code // len(begins), code % len(begins)
 
 
 def _only_links(links: Links, chosen: BoolArray, nodes: int) -> IntArray:
