@@ -82,7 +82,30 @@ def kitti(path):
     path.write_text("".join(line % k for k in range(15)), encoding="utf-8")
 
 
+def mot_of_eleven(path):
+    lines = (f"{k},{k % 3},{10 * k},2,30,40,0.5,-1,-1,-1,2\n" for k in range(1, 16))
+    path.write_text("".join(lines), encoding="utf-8")
+
+
+def visdrone(path):
+    lines = (f"{k},0,{10 * k},2,30,40,0.5,{4 + k % 3},{k % 2},{k % 3}\n" for k in range(1, 16))
+    path.write_text("".join(lines), encoding="utf-8")
+
+
+def darklabel(path):
+    lines = (f"{k},2,1,{10 * k},2,{10 * k + 30},42,car,2,200,20,230,50,van\n" for k in range(15))
+    path.write_text("".join(lines), encoding="utf-8")
+
+
+def sink(path):
+    box = '"x_min": %g, "y_min": 2, "x_max": %g, "y_max": 42, "class_id": 2, "confidence": 0.5'
+    more = '"tracker_id": 1, "class_name": "car", "frame_index": %d, "video_fps": 20.0'
+    rows = (("{" + box + ", " + more + "}") % (10 * k, 10 * k + 30, k) for k in range(15))
+    path.write_text("[" + ",".join(rows) + "]", encoding="utf-8")
+
+
 WRITERS = {"d.csv": csv, "d.parquet": csv, "d.npy": npy, "d.json": coco, "det.txt": mot, "k.txt": kitti}
+WRITERS |= {"eleven.txt": mot_of_eleven, "v.txt": visdrone, "dark.txt": darklabel, "sink.json": sink}
 
 
 @pytest.mark.parametrize("name", WRITERS)
