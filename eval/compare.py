@@ -25,7 +25,7 @@ from jeat_graph.eval.tables import Cell, Table
 from jeat_graph.smoothers.filtered_track import FilteredTrack
 
 #: Lags of the curve (s).
-LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0)
+LAGS_S = (0.0, 0.1, 0.2, 0.5, 1.0)
 
 # Share of the work that judging without truth is, where there is truth too.
 _CONSISTENCY = 0.3

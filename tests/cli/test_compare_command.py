@@ -111,7 +111,7 @@ def test_boxes_without_velocities_give_errors_of_positions(folder, small_plots, 
     assert "velocity" not in printed.split("Consistency")[0].split("\n")[1]
     values = json.loads((out / "compare.json").read_text())
     assert len(values["lag_curve"]) > 1
-    filtered, lagged = (values["errors"][name]["position_rmse"] for name in ("filter", "lag 0.05 s"))
+    filtered, lagged = (values["errors"][name]["position_rmse"] for name in ("filter", "lag 0.1 s"))
     assert 0.0 < lagged < filtered < 20.0
     assert values["errors"]["full"]["velocity_rmse"] is None
     for name in ("trajectories", "error-over-time", "rmse-against-lag"):
