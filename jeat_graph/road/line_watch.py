@@ -99,6 +99,8 @@ class LineWatch:
         Returns:
             The vehicles of which it is known now that they have passed.
         """
+        if not len(table) and not self._ways:
+            return []
         boxes = table.boxes
         foot = np.stack([boxes[:, 0] + 0.5 * boxes[:, 2], boxes[:, 1] + boxes[:, 3]], axis=1)
         place = self._camera.to_road(foot) if len(foot) else foot

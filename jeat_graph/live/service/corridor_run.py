@@ -29,8 +29,8 @@ from jeat_graph.live.service.systemd import Watchdog, notify
 from jeat_graph.live.service.web import Web
 from jeat_graph.live.transport.patience import UnconfirmedError
 
-#: Vehicles are decided about so often (s).
-_DECIDE_S = 2.0
+#: Vehicles are decided about so often (s): a gap is worked out as a whole each time.
+_DECIDE_S = 10.0
 _SLICE_S = 0.1
 #: After a signal a camera's end is waited for so long (s).
 _END_S = 20.0
