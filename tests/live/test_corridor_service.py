@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pytest
+import yaml
 from live_tests import corridor_scene as scene
 
 from jeat_graph.cli.main import main
@@ -184,6 +185,22 @@ def test_what_would_end_a_start_is_said_before(old, new, words, checked):
     assert code == 2
     assert words in said
     assert said.count("\n") == 1
+
+
+def test_lanes_of_other_names_than_learnt_are_refused(tmp_path, capsys):
+    pytest.importorskip("nats", reason="the client is not installed")
+    path = scene.written(tmp_path)
+    tree = scene.learnt()
+    for gap in tree["gaps"]:
+        gap["model"]["lane_ratios"] = {"slow": {"slow": 2.0, "fast": 0.1}, "fast": {"slow": 0.1, "fast": 2.0}}
+    (tmp_path / "corridor.yaml").write_text(yaml.safe_dump(tree))
+    assert main(["serve", "--check", str(path)]) == 2
+    assert "cameras.A.road.lines: has the lanes 1, 2, and those learnt of A-B are fast, slow" in (
+        capsys.readouterr().err
+    )
+    marks = (tmp_path / "lines.yaml").read_text().replace("'1'", "slow").replace("'2'", "fast")
+    (tmp_path / "lines.yaml").write_text(marks)
+    assert main(["serve", "--check", str(path)]) == 0
 
 
 def test_a_damaged_state_is_refused_or_renamed(tmp_path, broker):

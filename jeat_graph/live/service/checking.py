@@ -85,13 +85,14 @@ def check_corridor(config: CorridorConfig, *, detectors: bool) -> None:
     Raises:
         JeatGraphError: what would end a start, with the camera and the key where there is one.
     """
-    config.gaps()
+    gaps = config.gaps()
     for name, one in config.cameras.items():
         try:
             check_start(one, detectors=detectors)
         except JeatGraphError as error:
             raise ConfigError(f"cameras.{name}: {error}") from None
         config.watch(name)
+    config.check_lanes(gaps)
     whole = ServiceConfig(config.name, sinks=config.sinks, web=config.web)
     check_packages(whole)
     _check_web(whole)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -115,6 +115,22 @@ class CorridorConfig:
             replace(gap, parameters=replace(gap.parameters, offset_s=0.0), offset_variance=_COMMON_CLOCK_S**2)
             for gap in gaps
         ]
+
+    def check_lanes(self, gaps: Sequence[LearntGap]) -> None:
+        """See that the lanes of each camera, where it has some, are those that were learnt.
+
+        Raises:
+            ConfigError: none of them is.
+            DataError: a file of lines is not valid.
+        """
+        for gap in gaps:
+            for name, known in zip((gap.first, gap.second), gap.lanes, strict=True):
+                own = read_marks(self.roads[name].lines).lanes
+                if known and own and not set(known) & set(own):
+                    raise ConfigError(
+                        f"cameras.{name}.road.lines: has the lanes {', '.join(own)}, and those learnt of "
+                        f"{gap.first}-{gap.second} are {', '.join(known)}: give them the same names"
+                    )
 
     def watch(self, name: str) -> LineWatch:
         """Return what watches the line of a camera.
