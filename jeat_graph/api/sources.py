@@ -63,9 +63,9 @@ def recording_of(detections: Detections | pd.DataFrame | PathLike, options: Read
         return read_detections(detections, **options)
     if isinstance(detections, Detections):
         return detections
-    detections = collected(detections)
-    if hasattr(detections, "columns"):
-        return Detections.from_pandas(detections, **for_frames(options))
+    frame: Any = collected(detections)
+    if hasattr(frame, "columns"):
+        return Detections.from_pandas(frame, **for_frames(options))
     raise DataError(
         "detections are Detections, a data frame, or the path of a file (make one of arrays with "
         f"Detections.from_rows, of several with Detections.concatenate), not {type(detections).__name__}"
@@ -121,9 +121,9 @@ def tables_of(
     check_kind(kind)
     if isinstance(tracks, Trajectories):
         return {kind: tracks}
-    tracks = collected(tracks)
-    if hasattr(tracks, "columns"):
-        return {kind: Trajectories.from_pandas(tracks, **for_frames(options))}
+    frame: Any = collected(tracks)
+    if hasattr(frame, "columns"):
+        return {kind: Trajectories.from_pandas(frame, **for_frames(options))}
     raise DataError(
         "tracks are what track or read_run gives, a table of it, a data frame of one, or a path, "
         f"not {type(tracks).__name__}"

@@ -133,10 +133,10 @@ def tracks_reader(
     """Return what reads tables by kind, with their first frame given; `kind` says what a table alone is."""
     if isinstance(tracks, (str, Path)):
         return _path_reader(Path(tracks), options)
-    tracks = collected(tracks)
-    if hasattr(tracks, "columns") and not isinstance(tracks, Trajectories):
+    frame: Any = collected(tracks)
+    if hasattr(frame, "columns") and not isinstance(frame, Trajectories):
         check_kind(kind)
-        frame, like = tracks, for_frames(options)
+        like = for_frames(options)
 
         def read(first: int | None) -> tuple[dict[str, Trajectories], FrameCount | None]:
             how = _counting(like, first)
