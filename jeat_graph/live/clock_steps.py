@@ -209,8 +209,8 @@ class ClockSteps:
         for marks in (*self._marks.values(), *(doubt.marks for doubt in self._doubts.values())):
             if sensor in marks:
                 marks[sensor] -= lag_s
-        for doubt in self._doubts.values():
-            doubt.beside.clear()
+        for one in self._doubts.values():
+            one.beside.clear()
         doubt = self._doubts.get(sensor)
         if doubt is not None:
             doubt.before, doubt.first = doubt.before - lag_s, doubt.first - lag_s
