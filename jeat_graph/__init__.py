@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-# In a checkout `filters`, `association` and so on lie beside this folder; installed, they lie in it.
+# In a checkout `filters`, `association` and so on lie beside this folder, and links lead to them; installed,
+# they lie in it. Where Git makes no links (Windows without the right to), they are found beside it.
 if not (_FOLDER := Path(__file__).parent).joinpath("filters").is_dir():
     __path__.append(str(_FOLDER.parent))
 
