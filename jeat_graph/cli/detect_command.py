@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 STDOUT = "-"
 #: Decimal places of boxes (px) and of times (s) on stdout.
 _PLACES, _TIME_PLACES = 3, 6
+#: Decimal places of embeddings, numbers of −1 to 1.
+_LOOK_PLACES = 4
 WRITES = ("out",)
 HELP = "find vehicles in raw pictures and events and write a file of detections"
 
@@ -120,6 +122,9 @@ def _write_lines(scans: Iterable[Scan]) -> None:
         line["scores"] = np.round(scan.scores, _PLACES + 1).tolist()
         if scan.classes is not None:
             line["classes"] = scan.classes.tolist()
+        if scan.embeddings is not None and len(scan.boxes):
+            looks = np.round(scan.embeddings.astype(np.float64), _LOOK_PLACES)
+            line["embeddings"] = [None if np.isnan(look).any() else look.tolist() for look in looks]
         if scan.camera_motion is not None:
             line["camera_motion"] = scan.camera_motion.tolist()
         sys.stdout.write(json.dumps(line) + "\n")

@@ -95,10 +95,16 @@ def add_looking(parser: argparse._ActionsContainer) -> None:
     """Declare how detectors look."""
     add = parser.add_argument
     add(
+        "--embedder",
+        metavar="colour|FILE.onnx",
+        help="describe each box in the frames by a vector, which tells vehicles apart: colour (colours and "
+        "shape, no network), or a network that makes a vector of a crop",
+    )
+    add(
         "--detection-config",
         metavar="FILE",
         help="YAML with settings of the detectors (sections frames, events, model_frames, model_events, "
-        "model_fused, camera)",
+        "model_fused, camera, embedder)",
     )
     add(
         "--detection-set",
@@ -221,6 +227,7 @@ def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
     if args.detector_fused is not None or (args.frames is None and args.events is None):
         return []
     given = {
+        "--embedder": ("--frames", args.frames, args.embedder is not None),
         "--detector-frames": ("--frames", args.frames, args.detector_frames not in _NO_NETWORK),
         "--detector-events": ("--events", args.events, args.detector_events != "motion"),
         "--event-rate": ("--events", args.events, args.event_rate is not None),
@@ -300,6 +307,7 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
         detector_frames=args.detector_frames,
         detector_events=args.detector_events,
         detector_fused=args.detector_fused,
+        embedder=args.embedder,
         rate_hz=args.rate,
         frame_times=frame_times(args),
         event_size_px=args.event_size,

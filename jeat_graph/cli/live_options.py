@@ -90,8 +90,10 @@ def stream_request(args: argparse.Namespace) -> DetectRequest | None:
             if getattr(args, option) is not None:
                 name = option.replace("_", "-")
                 raise ConfigError(f"--{name} is of a camera that is on: it needs --frames or --events")
-        if args.masks or args.detection_set:
-            raise ConfigError("--mask and --detection-set are of a camera that is on: they need --frames")
+        if args.masks or args.detection_set or args.embedder:
+            raise ConfigError(
+                "--mask, --detection-set and --embedder are of a camera that is on: they need --frames"
+            )
         return None
     if args.source is not None:
         raise ConfigError("--source brings scans from elsewhere: leave it out, or --frames and --events")

@@ -103,6 +103,10 @@ def run(args: argparse.Namespace) -> int:
         raise DataError("--events is detected in where no DETECTIONS are given; give one or the other")
     if args.detections and args.frame_times is not None:
         raise DataError("--frame-times is of frames to detect in; DETECTIONS have their own times")
+    if args.detections and args.embedder is not None:
+        raise DataError(
+            "--embedder is of frames to detect in; DETECTIONS have embeddings of their own or none"
+        )
     from jeat_graph.io.files.addresses import is_live
     from jeat_graph.road.camera_file import read_camera
     from jeat_graph.runs.run_options import RunOptions

@@ -19,6 +19,7 @@ from jeat_graph.detection.automatic import resolved
 from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.burnt_in import find_clock
 from jeat_graph.detection.camera_flow import CameraFlow
+from jeat_graph.detection.embedding import Embedder, described, open_embedder
 from jeat_graph.detection.event_detector import EventDetector
 from jeat_graph.detection.frame_source import frames_of
 from jeat_graph.detection.masks import MaskedPicture
@@ -165,6 +166,7 @@ def _check_sizes(
 def _picture_scans(
     request: DetectRequest, source: FrameSource, stack: ExitStack, say: Callable[[str], object]
 ) -> _Scans:
+    embedder = embedder_of(request, say)
     if request.detector_frames != MOTION:
         from jeat_graph.detection.models.pictures import ModelPictureDetector
 
@@ -172,10 +174,27 @@ def _picture_scans(
         model = ModelPictureDetector(network, FRAMES_SENSOR, request.settings.model_frames)
         say(model.description)
         flow = CameraFlow(request.settings.camera)
-        found = (flow(frame, model(frame, t)) for t, frame in with_progress(source, len(source)))
-        return _with_note(found, model.note, say)
-    stack.enter_context(one_thread())
-    return _moving(source, request, _quiet_parts(source, request, say))
+        pictures = with_progress(source, len(source))
+        found = (described(flow(frame, model(frame, t)), frame, embedder) for t, frame in pictures)
+        scans = _with_note(found, model.note, say)
+    else:
+        stack.enter_context(one_thread())
+        scans = _moving(source, request, _quiet_parts(source, request, say), embedder)
+    return scans if embedder is None else _with_note(scans, embedder.note, say)
+
+
+def embedder_of(request: DetectRequest, say: Callable[[str], object]) -> Embedder | None:
+    """Open what describes boxes, and say what it is; None where nothing does.
+
+    Raises:
+        ConfigError: it is not known.
+        DataError: no network of crops.
+    """
+    if request.embedder is None:
+        return None
+    embedder = open_embedder(request.embedder, request.settings.embedder)
+    say(embedder.description)
+    return embedder
 
 
 def _quiet_parts(
@@ -199,7 +218,9 @@ def _quiet_parts(
     return masks.on(source.size_px) if masks else None
 
 
-def _moving(source: FrameSource, request: DetectRequest, quiet: MaskedPicture | None) -> _Scans:
+def _moving(
+    source: FrameSource, request: DetectRequest, quiet: MaskedPicture | None, embedder: Embedder | None
+) -> _Scans:
     """Yield what differs from the background, which is made when the first scan is asked for.
 
     By whoever asks: a thread, while another already looks at the events.
@@ -209,7 +230,7 @@ def _moving(source: FrameSource, request: DetectRequest, quiet: MaskedPicture | 
     for t, frame in with_progress(source, len(source)):
         scan = detector(frame if quiet is None else quiet.painted(frame), t)
         if scan is not None:
-            yield scan
+            yield described(scan, frame, embedder)
 
 
 def _prime(

@@ -13,7 +13,14 @@ from jeat_graph.detection.automatic import LOOK_S, PICTURES, chosen_by
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.burnt_in import find_clock
 from jeat_graph.detection.camera_flow import CameraFlow
-from jeat_graph.detection.detecting import CLOCK_S, EVENTS_SENSOR, FRAMES_SENSOR, event_detector
+from jeat_graph.detection.detecting import (
+    CLOCK_S,
+    EVENTS_SENSOR,
+    FRAMES_SENSOR,
+    embedder_of,
+    event_detector,
+)
+from jeat_graph.detection.embedding import Embedder, described
 from jeat_graph.detection.kept_choice import keep_choice, kept_choice
 from jeat_graph.detection.named import AUTO, FRAMES, MOTION, network_file
 from jeat_graph.detection.picture_detector import PictureDetector
@@ -115,8 +122,15 @@ class PictureWorker(Worker[LivePicture]):
     def scans(self, stopped: Until) -> Iterator[Scan]:
         """Yield what is found until it is stopped."""
         pictures = (picture for picture in self.items(stopped) if self._fits(picture))
+        embedder = embedder_of(self._request, self._say)
+        yield from self._found(pictures, embedder)
+        if embedder is not None and embedder.note():
+            self._say(embedder.note())
+
+    def _found(self, pictures: Iterator[LivePicture], embedder: Embedder | None) -> Iterator[Scan]:
+        """Yield what the detector finds, with its embeddings."""
         if self.detector == MOTION:
-            yield from self._moving(pictures)
+            yield from self._moving(pictures, embedder)
             return
         from jeat_graph.detection.models.pictures import ModelPictureDetector
 
@@ -125,7 +139,8 @@ class PictureWorker(Worker[LivePicture]):
         self._say(model.description)
         flow = CameraFlow(self._request.settings.camera)
         for picture in pictures:
-            yield self._masked(flow(picture.frame, model(picture.frame, picture.t)))
+            scan = self._masked(flow(picture.frame, model(picture.frame, picture.t)))
+            yield described(scan, picture.frame, embedder)
         if model.note():
             self._say(model.note())
 
@@ -134,7 +149,7 @@ class PictureWorker(Worker[LivePicture]):
         assert self.size_px is not None
         return masks.on(self.size_px).scan(scan) if masks else scan
 
-    def _moving(self, pictures: Iterator[LivePicture]) -> Iterator[Scan]:
+    def _moving(self, pictures: Iterator[LivePicture], embedder: Embedder | None) -> Iterator[Scan]:
         """Yield what moves; the background is made of the first seconds."""
         masks = self._request.masks
         if self._request.find_clock:
@@ -151,7 +166,7 @@ class PictureWorker(Worker[LivePicture]):
             quiet = masks.on(self.size_px) if masks else None
             scan = detector(picture.frame if quiet is None else quiet.painted(picture.frame), picture.t)
             if scan is not None:
-                yield scan if quiet is None else quiet.scan(scan)
+                yield described(scan if quiet is None else quiet.scan(scan), picture.frame, embedder)
 
 
 class EventWorker(Worker[LivePiece]):

@@ -77,7 +77,10 @@ class MaskedPicture:
         if keep.all():
             return scan
         classes = None if scan.classes is None else scan.classes[keep]
-        return replace(scan, boxes=scan.boxes[keep], scores=scan.scores[keep], classes=classes)
+        looks = None if scan.embeddings is None else scan.embeddings[keep]
+        return replace(
+            scan, boxes=scan.boxes[keep], scores=scan.scores[keep], classes=classes, embeddings=looks
+        )
 
     def keep(self, boxes: FloatArray) -> BoolArray:
         """Return which boxes (M, 4: left, top, width, height, px) do not lie mostly in a mask."""

@@ -28,6 +28,7 @@ class DetectRequest:
         detector_events: the same.
         detector_fused: a network that looks at both at once, instead of the other two; or None.
         frame_times: edges of the events' triggers that say when frames were taken; None: as the frames say.
+        embedder: what describes each box in the frames, `colour` or an ONNX file; None: nothing.
         rate_hz: frames per second where neither the video nor a table beside it says.
         event_size_px: width and height of the event camera's picture, where the file does not say.
         event_layout: columns, unit of time and recording, where the file of events leaves that open.
@@ -44,6 +45,7 @@ class DetectRequest:
     detector_frames: str = MOTION
     detector_events: str = MOTION
     detector_fused: str | None = None
+    embedder: str | None = None
     rate_hz: float | None = None
     frame_times: TriggerChoice | None = None
     event_size_px: tuple[int, int] | None = None
@@ -63,6 +65,8 @@ class DetectRequest:
         others = {self.detector_frames, self.detector_events}
         if self.detector_fused is not None and not others <= {AUTO, MOTION}:
             raise ConfigError("--detector-fused takes the place of --detector-frames and --detector-events")
+        if self.embedder is not None and (self.frames is None or self.detector_fused is not None):
+            raise ConfigError("--embedder describes boxes of --frames, found without --detector-fused")
 
     def _check_frame_times(self) -> None:
         if self.frames is None or self.events is None:

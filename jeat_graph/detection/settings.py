@@ -1,4 +1,4 @@
-"""Settings of detectors, from YAML: `frames`, `events`, of networks `model_frames` and its like, `camera`."""
+"""Settings of detectors, from YAML: `frames`, `events`, of networks `model_frames` and others, `camera`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from jeat_graph.config.section_tree import build, merge, read_tree, tree_of_chan
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.background import BackgroundSettings
 from jeat_graph.detection.camera_flow import CameraSettings
+from jeat_graph.detection.embedder_settings import EmbedderSettings
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.noise import NoiseSettings
 
@@ -169,6 +170,7 @@ class DetectionSettings:
     model_events: ModelSettings = field(default_factory=ModelSettings)
     model_fused: ModelSettings = field(default_factory=ModelSettings)
     camera: CameraSettings = field(default_factory=CameraSettings)
+    embedder: EmbedderSettings = field(default_factory=EmbedderSettings)
 
 
 def load_settings(path: str | Path | None = None, changes: Sequence[str] = ()) -> DetectionSettings:

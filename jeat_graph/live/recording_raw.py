@@ -59,7 +59,7 @@ def _origin(raw: DetectRequest) -> dict[str, Any]:
     settings = replace(raw, frames=raw.frames and "frames", events=raw.events and "events")
     networks = [
         sha256_of(name)
-        for name in (raw.detector_frames, raw.detector_events, raw.detector_fused or "")
+        for name in (raw.detector_frames, raw.detector_events, raw.detector_fused or "", raw.embedder or "")
         if Path(name).is_file()
     ]
     return {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -28,6 +29,8 @@ def test_boxes_that_lie_mostly_in_a_mask_are_left_out():
     )
     scan = Scan(1.0, "rgb", boxes.astype(float), np.full(5, 0.9), np.array(list("abcde")))
     assert masked.scan(scan).classes.tolist() == ["b", "d"]
+    looks = replace(scan, embeddings=np.eye(5))
+    np.testing.assert_array_equal(masked.scan(looks).embeddings, np.eye(5)[[1, 3]])
 
 
 @given(st.integers(0, 10**6))
