@@ -7,15 +7,15 @@ Source: HDF5's shuffle filter stores the first bytes of all values of a chunk fi
 from __future__ import annotations
 
 from contextlib import suppress
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-try:
-    from zlib_ng import zlib_ng
-except ImportError:  # an extra
-    zlib_ng = None
+zlib_ng: Any = None
+with suppress(ImportError):  # an extra
+    zlib_ng = import_module("zlib_ng.zlib_ng")
 
 _DEFLATE, _SHUFFLE = 1, 2  # H5Z_FILTER_DEFLATE, H5Z_FILTER_SHUFFLE
 
