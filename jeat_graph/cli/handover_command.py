@@ -75,6 +75,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="to which side the traffic that is followed crosses a camera's line, if it is crossed both ways",
     )
     add(
+        "--embeddings",
+        action="append",
+        default=[],
+        type=_named,
+        metavar="NAME=RUN",
+        help="the run of a camera's tracks, made with --embedder: what its vehicles look like; for both "
+        "cameras of a gap",
+    )
+    add(
         "--interval", type=positive, default=_INTERVAL_S, metavar="S",
         help=f"length of an interval of travel_times.csv and od.csv ({_INTERVAL_S:g})",
     )  # fmt: skip
@@ -101,6 +110,7 @@ def run(args: argparse.Namespace) -> int:
         travel_time_columns,
     )
     from jeat_graph.corridor.handover import chain, hand_over
+    from jeat_graph.corridor.passage_looks import check_looks, with_looks
     from jeat_graph.corridor.passages import read_passages
     from jeat_graph.io.files.outputs import check_folder
     from jeat_graph.io.tables.table_writer import write_columns
@@ -114,11 +124,14 @@ def run(args: argparse.Namespace) -> int:
     lines, ways = _once("--line", args.line, names), _once("--direction", args.direction, names)
     if set(ways.values()) - {"left", "right"}:
         raise ConfigError("--direction: must be NAME=left or NAME=right")
+    runs = _once("--embeddings", args.embeddings, names)
     gaps = _gaps(args)
     order = chain(gaps, names)
     cameras = {
         name: read_passages(folder, name, lines.get(name), ways.get(name)) for name, folder in args.cameras
     }
+    cameras |= {name: with_looks(cameras[name], run) for name, run in runs.items()}
+    check_looks([cameras[name] for name in order])
     gaps = sorted(gaps, key=lambda gap: order.index(gap.first))
     corridor = Corridor.of(order, cameras, hand_over(gaps, cameras))
     for over in corridor.handovers:
@@ -150,8 +163,16 @@ def _sentence(over: Handover) -> str:
         f"{a.camera}-{b.camera}: {len(over.first)} of {len(a)} vehicles are among the {len(b)} at "
         f"{b.camera}, {p.distance_m:.0f} m on; clock {p.offset_s:.3f} ± {sd:.3f} s ahead (peak "
         f"{over.peak.height:.0f} robust deviations, next {over.peak.runner_up:.0f}); travel times spread by "
-        f"{100.0 * p.spread:.1f} %"
+        f"{100.0 * p.spread:.1f} %{_of_looks(over)}"
     )
+
+
+def _of_looks(over: Handover) -> str:
+    """Say how well embeddings tell vehicles apart, where there are some."""
+    if over.fitted.gap.looks is None:
+        return ""
+    looks = over.fitted.parameters.looks
+    return f"; embeddings tell vehicles apart by d′ {0.0 if looks is None else looks.d_prime:.1f}"
 
 
 def _gaps(args: argparse.Namespace) -> list[KnownGap]:

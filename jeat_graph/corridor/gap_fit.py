@@ -23,6 +23,7 @@ from jeat_graph.corridor.gap_model import (
     table_of,
     within,
 )
+from jeat_graph.corridor.looks import learn_looks
 from jeat_graph.corridor.shared_slowness import Slowness, by_lane, pooled
 from jeat_graph.data.arrays import FloatArray
 
@@ -90,22 +91,27 @@ def fit_gap(gap: Gap, prior: Prior, offset_s: float, rounds: int = _ROUNDS) -> F
         gap: the cameras.
         prior: what is known.
         offset_s: where to begin with the clock.
-        rounds: at most so many.
+        rounds: at most so many, and as many again where looks count.
     """
     a, b = len(gap.before), len(gap.after)
     span = max(gap.after.span_s[1] - gap.after.span_s[0], 1.0)
     p = GapParameters(offset_s, prior.distance_m, rate=max(0.3 * b, 1.0) / span)
     slowness, shared = np.zeros(a), Slowness(np.zeros(a), 0.0, 60.0)
     covariance = np.zeros((2, 2))
-    for _ in range(rounds):
+    done = rounds
+    for k in range(2 * rounds):
         pairs = candidate_pairs(gap, p, slowness)
         times = pair_times(gap, pairs, p, slowness)
         ratio = log_ratios(gap, pairs, p, slowness, times)
         marginals = matching_marginals(pairs.i, pairs.j, ratio, a, b)
         old = p
         p, slowness, shared, covariance = _improved(gap, pairs, marginals.pair, p, slowness, times, prior)
-        if _change(old, p) < _TOLERANCE:
-            break
+        if _change(old, p) < _TOLERANCE or k + 1 == done:
+            # Looks are learnt once, by matches that times, lanes and lengths decide alone.
+            looks = learn_looks(gap.cosines(pairs), marginals.pair) if p.looks is None else None
+            if looks is None:
+                break
+            p, done = replace(p, looks=looks), k + 1 + rounds
     pairs = candidate_pairs(gap, p, slowness)
     ratio = log_ratios(gap, pairs, p, slowness, pair_times(gap, pairs, p, slowness))
     marginals = matching_marginals(pairs.i, pairs.j, ratio, a, b)

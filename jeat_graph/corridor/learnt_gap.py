@@ -119,6 +119,7 @@ def learnt_gap(tree: Mapping[str, Any], path: str | Path) -> LearntGap:
         weights=weights,
         lanes=lanes,
         kinds=kinds,
+        looks=None,  # vehicles that are followed while they drive have none
         **{key: numbers[key] for key in _PARAMETERS},
     )
     even = numbers["slowness_sd"] < _LEAST_SLOWNESS_SD

@@ -52,6 +52,7 @@ class Passages:
         kinds: names of the classes.
         span_s: begin and end of the recording (s).
         left_out: identities that are not among these, each with the reason.
+        looks: (N, E) what each looks like, NaN where that is not known; or None.
     """
 
     camera: str
@@ -69,6 +70,7 @@ class Passages:
     kinds: tuple[str, ...]
     span_s: tuple[float, float]
     left_out: tuple[tuple[int, str], ...] = ()
+    looks: FloatArray | None = None
 
     def __len__(self) -> int:
         """Number of vehicles."""
