@@ -79,6 +79,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a calibrated camera over the road, which also says the picture's size: write road_causal.csv "
         "and road_smoothed.csv (m, km/h) too, and the tables of --diagnostics",
     )
+    add(
+        "--identities",
+        metavar="FILE",
+        help="tracks that you have corrected, in place of identities that are decided "
+        "(smoother.identities): a table with t (s), track_id, left, top, width, height, such as an edited "
+        "smoothed.csv, or what CVAT exports as MOT 1.1; smoothed.csv follows them, and disagreements.csv "
+        "says where the model disagrees",
+    )
     raw = parser.add_argument_group(
         "raw recordings",
         "Without DETECTIONS, vehicles are detected in --frames, --events or both, and tracked; "
@@ -141,6 +149,7 @@ def run(args: argparse.Namespace) -> int:
         class_names=args.class_names,
         frames=args.frames,
         rig=args.rig,
+        identities=args.identities,
         detectors=detectors,
         options=RunOptions(
             formats=extra_formats(args),
@@ -153,6 +162,8 @@ def run(args: argparse.Namespace) -> int:
     )
     counts = track_files(request, _warn, _say).counts
     print(f"{counts['scans']} scans, {counts['detections']} detections: {counts['tracks_reported']} tracks")
+    if args.identities is not None:
+        print(f"{counts['disagreements']} rows of {args.identities} lie off the model by more than 3 sigma")
     print(f"wrote {Path(args.out)}")
     return 0
 

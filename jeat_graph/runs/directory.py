@@ -42,11 +42,16 @@ DIAGNOSTICS = "diagnostics.csv"
 MEASUREMENTS = "measurements.parquet"
 #: What the smoother joined (`io/tables/links_io.py`).
 LINKS = "links.csv"
+#: Where the model disagrees with corrected identities (`io/tables/corrected_io.py`).
+DISAGREEMENTS = "disagreements.csv"
 ROAD_CAUSAL, ROAD_SMOOTHED = "road_causal.csv", "road_smoothed.csv"
 TABLES = ("causal", "smoothed")
 SUFFIXES = {one.name: one.suffix for one in written_formats()}
 _TABLE_FILES = (kind + suffix for kind in TABLES for suffix in SUFFIXES.values())
-RUN_FILES = (*_TABLE_FILES, SCANS, LINKS, DIAGNOSTICS, MEASUREMENTS, ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON)
+RUN_FILES = (
+    *(*_TABLE_FILES, SCANS, LINKS, DISAGREEMENTS, DIAGNOSTICS, MEASUREMENTS),
+    *(ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON),
+)
 
 
 def read_record(folder: Path) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.config.schema import Config
+from jeat_graph.data.corrected_tracks import CorrectedTracks
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.io.formats.csv_table import FORMAT as CSV
 from jeat_graph.io.formats.registry import written_formats
@@ -28,6 +29,7 @@ class RunOptions:
         resume: whether to go on where an earlier run in the same folder was broken off.
         after: called with the folder and the configuration when the tables are complete, to write more files
             of the run from them; or None. Needs `diagnostics` if it wants the measurements.
+        corrected: identities that the smoothed table is to follow, with `smoother.identities=whole`; or None.
     """
 
     formats: tuple[str, ...] = ()
@@ -36,6 +38,7 @@ class RunOptions:
     diagnostics: bool = False
     resume: bool = False
     after: Callable[[Path, Config], object] | None = None
+    corrected: CorrectedTracks | None = None
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.formats if name not in EXTRA_FORMATS]

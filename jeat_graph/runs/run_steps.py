@@ -20,11 +20,13 @@ from jeat_graph.data.progress import refreshing
 from jeat_graph.io.files.piecewise import PiecewiseWriter
 from jeat_graph.io.formats.csv_table import FORMAT as CSV
 from jeat_graph.io.formats.registry import written_formats
+from jeat_graph.io.tables.corrected_io import write_disagreements
 from jeat_graph.io.tables.links_io import write_links
-from jeat_graph.runs.directory import DIAGNOSTICS, LINKS, MEASUREMENTS, RESUME, RunDirectory
+from jeat_graph.runs.directory import DIAGNOSTICS, DISAGREEMENTS, LINKS, MEASUREMENTS, RESUME, RunDirectory
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.unfinished import UnfinishedRun
 from jeat_graph.tracking.damage import refusing_damage
+from jeat_graph.tracking.identities.corrected import match
 from jeat_graph.tracking.measured import ConfirmedMeasurements
 from jeat_graph.tracking.tracker import Tracker
 
@@ -82,6 +84,9 @@ class RunSteps:
                 self._tracker = Tracker.from_state(config, saved["tracker"])
                 self._done, self._rows = saved["done"], saved["counts"]
                 self._reported = set(saved["reported"].tolist())
+            if options.corrected is not None:
+                match(detections, options.corrected)  # what fits nothing is refused before all the work
+                self._tracker.follow(options.corrected)
             if options.diagnostics:
                 self._kept = ConfirmedMeasurements(self._tracker)
                 if saved is not None:
@@ -124,6 +129,10 @@ class RunSteps:
         links = self._tracker.identity_links()
         if links is not None:
             write_links(links, self._run.path(LINKS))
+        disagreements = self._tracker.disagreements()
+        if disagreements is not None:
+            write_disagreements(disagreements, self._run.path(DISAGREEMENTS))
+            self._record.counts["disagreements"] = len(disagreements.t)
         taken = step_s[self._done :]
         self._sum_up(taken if len(taken) else np.zeros(1), time.perf_counter() - begin)
         return self._instants
@@ -167,8 +176,9 @@ class RunSteps:
     def _identity(self) -> dict[str, Any]:
         """All that the rows depend on, as it stands in messages."""
         source = self._record.source
+        files = [*source.get("inputs", []), *source.get("identities", [])]
         content = {
-            "inputs": [one.get("sha256") for one in source.get("inputs", [])],
+            "inputs": [one.get("sha256") for one in files],
             "scans": [self._detections.num_scans, len(self._detections), float(self._instants[-1])],
             "settings": config_to_dict(self._config),
             "options": self._options.diagnostics,

@@ -41,6 +41,7 @@ class TrackRequest:
         image: size of the picture (px) for boxes in shares of it; None for that of the configuration.
         frames: pictures that tell the picture's size and the frame rate, or None.
         rig: file with the pictures and clocks of the sensors, or None.
+        identities: file of tracks that a person has corrected, for the smoothed table to follow; or None.
         detectors: what made the detections, `sensor: name` or a file's name; for the record.
         options: how the run is written.
     """
@@ -61,6 +62,7 @@ class TrackRequest:
     image: tuple[float, float] | None = None
     frames: str | None = None
     rig: str | None = None
+    identities: str | None = None
     detectors: tuple[str, ...] = ()
     options: RunOptions = field(default_factory=RunOptions)
 
@@ -70,6 +72,11 @@ class TrackRequest:
         from jeat_graph.io.tables.detections_io import split_name
 
         return [str(split_name(item)[1]) for item in self.detections]
+
+    @property
+    def all_files(self) -> list[str]:
+        """Paths of the detections and of the corrected identities."""
+        return [*self.files, *([] if self.identities is None else [self.identities])]
 
     def with_facts(self) -> tuple[TrackRequest, Facts | None]:
         """Complete the frame rate by what files beside the detections say, and return what they say.
@@ -140,8 +147,31 @@ class TrackRequest:
             "reading": {"detections": list(self.detections), **self._reading()},
             **({} if self.images is None else {"images": describe_inputs([self.images])[0]}),
             **({} if self.rig is None else {"rig": describe_inputs([self.rig])[0]}),
+            **({} if self.identities is None else {"identities": describe_inputs([self.identities])}),
             **({"detectors": list(self.detectors)} if self.detectors else {}),
         }
+
+    def following(self, config: Config) -> tuple[Config, TrackRequest]:
+        """Return the configuration, and the request with the corrected identities, that go along these.
+
+        Raises:
+            ConfigError: there is no smoother, or the engine takes no identities.
+            DataError: the file cannot be read.
+        """
+        from jeat_graph.data.errors import ConfigError
+        from jeat_graph.data.tables.reading import Reading
+        from jeat_graph.io.tables.corrected_io import read_corrected
+
+        if self.identities is None:
+            return config, self
+        if config.smoother.engine == "none" or config.tracker.engine == "paper":
+            lacking = "smoother.engine=none" if config.smoother.engine == "none" else "tracker.engine=paper"
+            raise ConfigError(f"--identities does not go with {lacking}: nothing smooths along them")
+        # Its times are seconds, and its frames count as its format does, however the detections' do.
+        how = Reading(rate_hz=self.rate_hz, image=self.image, images=self.images)
+        options = replace(self.options, corrected=read_corrected(self.identities, how))
+        config = replace(config, smoother=replace(config.smoother, identities="whole"))
+        return config, replace(self, options=options)
 
     def _reading(self) -> dict[str, Any]:
         more = {
@@ -195,8 +225,8 @@ def track_files(
     begin = time.perf_counter()
     config, notes = request.configured()
     check_distinct(request.detections)
-    directory = RunDirectory(request.out, inputs=request.files)
-    request = request.with_facts()[0]
+    directory = RunDirectory(request.out, inputs=request.all_files)
+    config, request = request.with_facts()[0].following(config)
     if config.input.picture == "given" and any(recognise(path).in_shares for path in request.files):
         request = replace(request, image=(config.image.width, config.image.height))
     for note in notes:

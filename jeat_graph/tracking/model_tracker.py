@@ -63,7 +63,7 @@ def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
 @one_at_a_time(
     "step take_in hand_over snapshot restore begin_anew number_on_from takers living last_looks meet causal "
     "rows_below_least predict last_updates last_measurements smoothed drain_smoothed settle finish "
-    "finish_in_pieces identity_links state hypotheses learnt sensor_states"
+    "finish_in_pieces follow disagreements identity_links state hypotheses learnt sensor_states"
 )
 class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
     """An engine as a tracker.

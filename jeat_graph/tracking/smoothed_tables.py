@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, cast
 
+from jeat_graph.data.corrected_tracks import CorrectedTracks, Disagreements
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.rows import ModelRows
 from jeat_graph.tracking.engine import TrackEngine
+from jeat_graph.tracking.identities.corrected import along_corrected
 from jeat_graph.tracking.identities.log import IdentityLog
 from jeat_graph.tracking.identities.whole import decided
 
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
 class SmoothedTables:
     """A tracker's smoothed tables; see `ModelTracker`."""
+
+    _corrected: CorrectedTracks | None = None
+    _disagreements: Disagreements | None = None
 
     if TYPE_CHECKING:
         sensor_names: tuple[str, ...]
@@ -44,7 +49,7 @@ class SmoothedTables:
         """
         self._check_smooths()
         if self._log is not None:
-            return Trajectories.concatenate(list(decided(self._tracker(), self._log)[1]))
+            return Trajectories.concatenate(list(self._decided(self._log)))
         return self._smoothed_table(self._model.smoothed())
 
     def drain_smoothed(self) -> Trajectories:
@@ -72,13 +77,33 @@ class SmoothedTables:
         if done:
             return iter(())
         if self._log is not None:
-            self._links, pieces = decided(self._tracker(), self._log)
-            return pieces
+            return self._decided(self._log)
         return iter((self._smoothed_table(self._model.finish()),) if self._smooths else ())
 
     def identity_links(self) -> IdentityLinks | None:
         """Return what the smoother joined, after `finish`; None where identities are causal."""
         return self._links
+
+    def follow(self, rows: CorrectedTracks) -> None:
+        """Have the smoothed tables follow identities that a person has corrected.
+
+        Raises:
+            JeatGraphError: the tracker keeps no recording (`smoother.identities` is not `whole`).
+        """
+        if not self.keeps_recording:
+            raise JeatGraphError("corrected identities need smoother.identities=whole and a smoother")
+        self._corrected = rows
+
+    def disagreements(self) -> Disagreements | None:
+        """Return where the model disagrees with what it follows, after `finish`; None if that is nothing."""
+        return self._disagreements
+
+    def _decided(self, log: IdentityLog) -> Iterator[Trajectories]:
+        if self._corrected is not None:
+            self._disagreements, pieces = along_corrected(self._tracker(), log, self._corrected)
+        else:
+            self._links, pieces = decided(self._tracker(), log)
+        return pieces
 
     def _check_smooths(self) -> None:
         if not self._smooths and self._log is None:

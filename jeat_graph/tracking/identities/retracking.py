@@ -22,7 +22,12 @@ STEPS_PER_PIECE = 256
 
 
 def retrack(
-    detections: Detections, decision: IdentityDecision, later: FloatArray, like: ModelTracker
+    detections: Detections,
+    decision: IdentityDecision,
+    later: FloatArray,
+    like: ModelTracker,
+    *,
+    anew: bool = False,
 ) -> Iterator[Trajectories]:
     """Track a recording along given identities; yield its smoothed rows as they become final.
 
@@ -34,12 +39,13 @@ def retrack(
         decision: who is who.
         later: (N,) posterior of an object at each detection by what comes after it.
         like: a tracker with the configuration and the constants.
+        anew: whether all tracks follow what was decided, as if each had changed.
     """
     owner, t = decision.owner, np.repeat(detections.scan_t, np.diff(detections.scan_start))
-    changed = changed_tracks(decision)
+    changed = np.ones(len(owner), dtype=bool) if anew else changed_tracks(decision)
     above = max(int(owner.max(initial=0)), int(decision.causal.max(initial=0)))
-    along = [_Along(like, above, np.where(changed, 0, decision.causal))]
-    if changed.any():
+    along = [] if anew else [_Along(like, above, np.where(changed, 0, decision.causal))]
+    if anew or changed.any():
         given = np.stack([np.where(owner > 0, owner, -1), _more_to_come(owner, t), later], axis=1)
         along.append(_Along(like, above, np.where(changed, owner, 0), given))
     done = 0
