@@ -28,6 +28,8 @@ from jeat_graph.corridor.shared_slowness import Slowness, by_lane, pooled
 from jeat_graph.data.arrays import FloatArray
 
 _ROUNDS = 40
+#: What vehicles look like is learnt so many times, each with better times of the gap.
+_LOOKS_LEARNT = 2
 _TOLERANCE = 1e-4
 #: Priors, each a mean with its standard deviation: of the speeds' weights, and of the mean slowness, which
 #: holds the errors of both cameras' scales too.
@@ -98,8 +100,8 @@ def fit_gap(gap: Gap, prior: Prior, offset_s: float, rounds: int = _ROUNDS) -> F
     p = GapParameters(offset_s, prior.distance_m, rate=max(0.3 * b, 1.0) / span)
     slowness, shared = np.zeros(a), Slowness(np.zeros(a), 0.0, 60.0)
     covariance = np.zeros((2, 2))
-    done = rounds
-    for k in range(2 * rounds):
+    done, learnt = rounds, 0
+    for k in range((1 + _LOOKS_LEARNT) * rounds):
         pairs = candidate_pairs(gap, p, slowness)
         times = pair_times(gap, pairs, p, slowness)
         ratio = log_ratios(gap, pairs, p, slowness, times)
@@ -107,11 +109,19 @@ def fit_gap(gap: Gap, prior: Prior, offset_s: float, rounds: int = _ROUNDS) -> F
         old = p
         p, slowness, shared, covariance = _improved(gap, pairs, marginals.pair, p, slowness, times, prior)
         if _change(old, p) < _TOLERANCE or k + 1 == done:
-            # Looks are learnt once, by matches that times, lanes and lengths decide alone.
-            looks = learn_looks(gap.cosines(pairs), marginals.pair) if p.looks is None else None
-            if looks is None:
+            if gap.looks is None or learnt == _LOOKS_LEARNT:
                 break
-            p, done = replace(p, looks=looks), k + 1 + rounds
+            # By matches that times, lanes and lengths decide alone; again when these are known better.
+            cosine = gap.cosines(pairs)
+            if p.looks is not None:
+                marginals = matching_marginals(pairs.i, pairs.j, ratio - p.looks.log_ratio(cosine), a, b)
+            p, learnt, done = (
+                replace(p, looks=learn_looks(cosine, marginals.pair)),
+                learnt + 1,
+                k + 1 + rounds,
+            )
+            if p.looks is None:
+                break
     pairs = candidate_pairs(gap, p, slowness)
     ratio = log_ratios(gap, pairs, p, slowness, pair_times(gap, pairs, p, slowness))
     marginals = matching_marginals(pairs.i, pairs.j, ratio, a, b)
