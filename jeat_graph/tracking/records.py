@@ -33,7 +33,8 @@ def record_tracks(
         detections: the recording.
         progress: whether to show a progress bar on stderr.
     """
-    tracker = Tracker(replace(config, smoother=replace(config.smoother, engine="full")))
+    smoother = replace(config.smoother, engine="full", identities="causal")
+    tracker = Tracker(replace(config, smoother=smoother))
     tables = [Trajectories.empty(config.sensor_names)]
     records: list[FilterRecord] = []
     times: list[float] = []
