@@ -26,6 +26,7 @@ from jeat_graph.config.argument_types import counting, positive
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
+_SHARED = "../shared/data"
 #: A recording with fewer boxes of truth is not drawn for: its scores are luck.
 _LEAST_ROWS = 1000
 #: A union fails that is worse than the best alone by more than so much in one score; of its own detectors and
@@ -46,7 +47,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the benchmark's arguments."""
     common.declare(parser, "unions", {})
     add = parser.add_argument
-    add("root", metavar="ROOT", help="folder of recordings with detections and truth, as for `real`")
+    add(
+        "root",
+        nargs="?",
+        default=_SHARED,
+        metavar="ROOT",
+        help=f"folder of recordings with detections and truth ({_SHARED})",
+    )
     add("--rate", type=positive, default=25.0, metavar="HZ", help="frames per second where not known (25)")
     add("--draws", type=counting, default=10, metavar="N", help="draws of each recording (10)")
     add("--sets", nargs="+", metavar="NAME", help="only these sets")

@@ -37,6 +37,7 @@ PUBLIC = {
     "jeat_graph.data.errors",
     "jeat_graph.data.events",
     "jeat_graph.data.interop",
+    "jeat_graph.data.normal",
     "jeat_graph.data.private_folder",
     "jeat_graph.data.processes",
     "jeat_graph.data.progress",
