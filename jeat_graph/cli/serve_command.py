@@ -6,7 +6,9 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from jeat_graph.live.service.config import ServiceConfig
     from jeat_graph.live.service.corridor_config import CorridorConfig
+    from jeat_graph.live.service.log import Log
 
 HELP = (
     "run a service described by one file: sources, detectors, tracker, sinks, health and metrics, of one rig "
@@ -43,58 +45,45 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal comes."""
     from jeat_graph.data.errors import ConfigError
-    from jeat_graph.live.interrupts import Interrupts
-    from jeat_graph.live.service.checking import ask_others, check_start
     from jeat_graph.live.service.config import read_service
-    from jeat_graph.live.service.corridor_config import read_corridor_service
+    from jeat_graph.live.service.corridor_config import CorridorConfig, read_corridor_service
+    from jeat_graph.live.service.corridor_run import CorridorService
     from jeat_graph.live.service.log import WARNING, Log
     from jeat_graph.live.service.run import Service
 
-    corridor = read_corridor_service(args.service)
-    if corridor is not None:
-        return _run_corridor(args, *corridor)
-    config, warnings = read_service(args.service)
+    config, warnings = read_corridor_service(args.service) or read_service(args.service)
     log = Log(config.name)
     for text in warnings:
         log.write(WARNING, text)
     if args.connect and not args.check:
         raise ConfigError("--connect goes with --check: a start connects anyway")
     if args.check:
-        with Interrupts() as interrupts, log.of_libraries():
-            check_start(config, detectors=True)
-            if args.connect:
-                ask_others(config, log, lambda: interrupts.seen is not None)
-        if interrupts.seen is not None:
-            return 128 + interrupts.seen
-        print(f"{args.service}: valid: {len(config.sources)} sources, {len(config.sinks)} sinks")
-        return 0
+        return _check(args, config, log)
+    if isinstance(config, CorridorConfig):
+        return CorridorService(config, log, sets_aside_damaged=args.set_aside_damaged).run()
     return Service(config, log, sets_aside_damaged=args.set_aside_damaged).run()
 
 
-def _run_corridor(args: argparse.Namespace, config: CorridorConfig, warnings: list[str]) -> int:
-    """Serve several cameras along a road until a signal comes."""
-    from jeat_graph.data.errors import ConfigError
+def _check(args: argparse.Namespace, config: ServiceConfig | CorridorConfig, log: Log) -> int:
+    """Build what a start would build, and connect where that is asked for."""
     from jeat_graph.live.interrupts import Interrupts
-    from jeat_graph.live.service.checking import ask_others, check_corridor
+    from jeat_graph.live.service.checking import ask_others, check_corridor, check_start
     from jeat_graph.live.service.config import ServiceConfig
-    from jeat_graph.live.service.corridor_run import CorridorService
-    from jeat_graph.live.service.log import WARNING, Log
 
-    log = Log(config.name)
-    for text in warnings:
-        log.write(WARNING, text)
-    if args.connect and not args.check:
-        raise ConfigError("--connect goes with --check: a start connects anyway")
-    if args.check:
-        with Interrupts() as interrupts, log.of_libraries():
+    cameras = ""
+    with Interrupts() as interrupts, log.of_libraries():
+        if isinstance(config, ServiceConfig):
+            parts = [config]
+            check_start(config, detectors=True)
+        else:
+            parts = [*config.cameras.values(), ServiceConfig(config.name, sinks=config.sinks)]
+            cameras = f"{len(config.cameras)} cameras, "
             check_corridor(config, detectors=True)
-            if args.connect:
-                for one in (*config.cameras.values(), ServiceConfig(config.name, sinks=config.sinks)):
-                    ask_others(one, log, lambda: interrupts.seen is not None)
-        if interrupts.seen is not None:
-            return 128 + interrupts.seen
-        sources = sum(len(one.sources) for one in config.cameras.values())
-        sinks = len(config.sinks) + sum(len(one.sinks) for one in config.cameras.values())
-        print(f"{args.service}: valid: {len(config.cameras)} cameras, {sources} sources, {sinks} sinks")
-        return 0
-    return CorridorService(config, log, sets_aside_damaged=args.set_aside_damaged).run()
+        if args.connect:
+            for one in parts:
+                ask_others(one, log, lambda: interrupts.seen is not None)
+    if interrupts.seen is not None:
+        return 128 + interrupts.seen
+    sources, sinks = sum(len(one.sources) for one in parts), sum(len(one.sinks) for one in parts)
+    print(f"{args.service}: valid: {cameras}{sources} sources, {sinks} sinks")
+    return 0

@@ -93,7 +93,7 @@ def fit_gap(gap: Gap, prior: Prior, offset_s: float, rounds: int = _ROUNDS) -> F
         gap: the cameras.
         prior: what is known.
         offset_s: where to begin with the clock.
-        rounds: at most so many, and as many again where looks count.
+        rounds: at most so many, and as many again each time that looks are learnt.
     """
     a, b = len(gap.before), len(gap.after)
     span = max(gap.after.span_s[1] - gap.after.span_s[0], 1.0)
@@ -148,7 +148,7 @@ def _improved(
     prior: Prior,
 ) -> tuple[GapParameters, FloatArray, Slowness, FloatArray]:
     """Return the next parameters, the slowness of each passage, what is shared of it, and the covariance."""
-    share = probability / (1.0 + np.exp(np.clip(times.outlier - times.inlier, -50.0, 50.0)))
+    share = times.of_traffic(probability)
     total = float(probability.sum())
     p, mean_slowness, covariance = _clock_and_weights(gap, pairs, share, p, slowness, times, prior)
     level = np.full(len(gap.before), mean_slowness)

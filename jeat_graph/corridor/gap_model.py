@@ -244,6 +244,10 @@ class PairTimes(NamedTuple):
     inlier: FloatArray
     outlier: FloatArray
 
+    def of_traffic(self, probability: FloatArray | float) -> FloatArray:
+        """Return the part of the pairs' probability (E,) that goes with the traffic, and is no outlier."""
+        return np.asarray(probability / (1.0 + np.exp(np.clip(self.outlier - self.inlier, -50.0, 50.0))))
+
 
 def pair_times(gap: Gap, pairs: PassagePairs, p: GapParameters, slowness: FloatArray) -> PairTimes:
     """Return travel times, residuals and both parts of their density; travel times are positive."""

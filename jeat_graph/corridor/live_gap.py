@@ -19,7 +19,6 @@ from jeat_graph.corridor.gap_model import (
     WINDOW,
     Gap,
     GapParameters,
-    PairTimes,
     PassagePairs,
     candidate_pairs,
     log_ratios,
@@ -284,7 +283,7 @@ class LiveGap:
         all_pairs = PassagePairs(i, np.concatenate([window.known.j, pairs.j]))
         level = np.full(len(gap.before), self.learnt.slowness)
         times = pair_times(gap, all_pairs, p, level)
-        weight = np.concatenate([window.known_weight, probability]) * _inlier_share(times)
+        weight = np.concatenate([window.known_weight, probability]) * times.of_traffic(1.0)
         t, lane = gap.before.t, gap.before.lane
         value, noise = pooled(i, times.error, times.variance, weight, len(t))
         out = smoothed(t, value, noise, self.learnt.slowness_sd, self.learnt.slowness_time_s)
@@ -310,10 +309,6 @@ class LiveGap:
         self._waiting = [LivePassage(*one) for one in state["waiting"]]
         self._known = [(LivePassage(*a), LivePassage(*b), p) for a, b, p in state["known"]]
         self._came, self.slowness_now = list(state["came"]), float(state["slowness"])
-
-
-def _inlier_share(times: PairTimes) -> FloatArray:
-    return np.asarray(1.0 / (1.0 + np.exp(np.clip(times.outlier - times.inlier, -50.0, 50.0))))
 
 
 def _passages(
