@@ -33,6 +33,9 @@ _PRIOR_GAPS, _PRIOR_GAP_S = 3, 0.3
 _AT_ENDS = 2.5
 #: Nats of a link that all passes have made.
 VOTES = 3.0
+#: What a link's gain is made up of: how well the motions fit, the passes that made it, the length of the gap,
+#: that the second piece is not born, and that the object of the first does not leave.
+TERMS = ("motion", "passes", "gap length", "no birth", "no exit")
 
 
 class Pieces(NamedTuple):
@@ -55,10 +58,12 @@ class Joined(NamedTuple):
     Attributes:
         links: all possible links with their gains.
         cover: (P,) the link that continues each piece in the best cover, -1 for none.
+        terms: (E, 5) what the gains are the sums of, in the order of `TERMS`.
     """
 
     links: Links
     cover: IntArray
+    terms: FloatArray
 
 
 def join(
@@ -84,11 +89,13 @@ def join(
     first = pieces.begins <= span[0] + _AT_ENDS * step_s
     last = pieces.ends >= span[1] - _AT_ENDS * step_s
     cover = np.full(len(pieces.begins), -1, dtype=np.int64)
-    links = possible
+    links, terms = possible, np.zeros((len(u), len(TERMS)))
+    terms[:, 0], terms[:, 1] = possible.gain, VOTES * votes
     for _ in range(_ROUNDS):
-        gain = possible.gain + VOTES * votes + np.log(gap_density(u, median, step_s))
-        gain = gain - np.log(births / _AREA)[born[possible.head]] - np.log(exits)[left[possible.tail]]
-        links = possible._replace(gain=gain)
+        terms[:, 2] = np.log(gap_density(u, median, step_s))
+        terms[:, 3] = -np.log(births / _AREA)[born[possible.head]]
+        terms[:, 4] = -np.log(exits)[left[possible.tail]]
+        links = possible._replace(gain=terms.sum(axis=1))
         cover = best_cover(links, len(cover))
         made = cover[cover >= 0]
         continued, continues = cover >= 0, np.zeros(len(cover), dtype=bool)
@@ -99,7 +106,7 @@ def join(
         exits = leaving / (leaving + np.bincount(left[continued], minlength=2) + 1.0)
         gaps = u[made]
         median = float(np.median(np.append(gaps[gaps > 1.5 * step_s], [_PRIOR_GAP_S] * _PRIOR_GAPS)))
-    return Joined(links, cover)
+    return Joined(links, cover, terms)
 
 
 def gap_density(u: FloatArray, median: float, step_s: float) -> FloatArray:

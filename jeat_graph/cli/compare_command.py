@@ -7,7 +7,7 @@ from pathlib import Path
 
 from jeat_graph.cli.options import add_tables, tables_read
 from jeat_graph.cli.progress import stages
-from jeat_graph.cli.terminal import warn
+from jeat_graph.cli.terminal import say, warn
 from jeat_graph.config.argument_types import not_negative
 from jeat_graph.data.errors import DataError
 
@@ -66,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.io.files.atomic import check_writable, open_atomic
     from jeat_graph.runs.beside import rate_of_truth
     from jeat_graph.runs.measured import compare_run, measured_run
+    from jeat_graph.runs.run_identities import links_of_run
     from jeat_graph.runs.run_truth import read_truth_of_run
 
     folder = Path(args.run_directory)
@@ -82,6 +83,8 @@ def run(args: argparse.Namespace) -> int:
     with stages("compare", 2) as stage:
         stage("reading, or tracking again")
         measured = measured_run(folder, args.detections)
+        if links_of_run(folder) is not None:
+            say("compare", "identities are those of causal.csv, not the decided ones of smoothed.csv")
         stage("smoothing at all lags")
         comparison = compare_run(measured, truth, args.lags, args.gtsam)
         comparison = with_road(comparison, folder, args.road or road_truth_beside(folder, args.gt))

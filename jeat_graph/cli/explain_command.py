@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jeat_graph.cli.progress import stages
-from jeat_graph.data.errors import ConfigError
+from jeat_graph.cli.said_of_identities import said_of_identities
+from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.eval.tables import FORMATS
 
 if TYPE_CHECKING:
@@ -40,7 +41,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("run_directory", metavar="RUN", help="directory of a run; its inputs must not have changed since")
     what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument("--track", type=int, metavar="ID", help="explain this track, reported or not")
+    what.add_argument(
+        "--track",
+        type=int,
+        metavar="ID",
+        help="explain this track, reported or not: an identity of causal.csv, or of smoothed.csv where "
+        "the smoother decided identities",
+    )
     what.add_argument(
         "--at",
         type=_place,
@@ -56,26 +63,42 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track the recording again and tell of a track, or of a place."""
-    from jeat_graph.runs.explaining import explain_place, explain_track, run_to_explain
+    from jeat_graph.runs.explaining import explain_place, explain_tracks, run_to_explain
+    from jeat_graph.runs.run_identities import identities_of_run
 
     if args.out is not None and args.track is None:
         raise ConfigError("--out plots a track: it needs --track ID")
     if args.out is not None and Path(args.out).suffix.lower() not in _SUFFIXES:
         raise ConfigError(f"--out {args.out}: the name of a plot must end in {', '.join(_SUFFIXES)}")
+    folder, lines = Path(args.run_directory), []
     with stages("explain", 2) as stage:
         stage("reading")
-        config, detections = run_to_explain(Path(args.run_directory), args.detections)
+        config, detections = run_to_explain(folder, args.detections)
+        identities = None if args.track is None else identities_of_run(folder)
         stage("tracking again")
         if args.track is None:
             place = explain_place(config, detections, *args.at)
             print("\n".join(_said_of_place(place, args.at, args.format)))
             return 0
-        moments = explain_track(config, detections, args.track)
-    print("\n".join(_said_of_track(moments, args.track, args.format)))
+        wanted = [args.track]
+        if identities is not None:
+            lines = said_of_identities(identities, args.track)
+            wanted += [one.causal_id for one in identities.of_identity(args.track)]
+        found = explain_tracks(config, detections, set(wanted))
+    # An identity that no causal track began with is told of by the causal tracks that it is made of.
+    shown = [args.track] if args.track in found else list(dict.fromkeys(wanted[1:]))
+    if not shown:
+        raise DataError(f"there is no track {args.track}")
+    for track_id in shown:
+        lines += [""] * bool(lines)
+        lines += _said_of_track(found[track_id], track_id, args.format)
+    print("\n".join(lines))
     if args.out is not None:
         from jeat_graph.drawing.explanation import plot_explanation
 
-        plot_explanation(moments, f"track {args.track}", Path(args.out))
+        moments = [moment for track_id in shown for moment in found[track_id]]
+        links = None if identities is None else identities.links_of(args.track)
+        plot_explanation(moments, f"track {args.track}", Path(args.out), links)
     return 0
 
 

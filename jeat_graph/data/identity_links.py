@@ -16,6 +16,7 @@ class IdentityLinks(NamedTuple):
         t_tail, t_head: their times (s).
         log_ratio: ln of how much likelier the two belong together than apart.
         probability: that they do.
+        terms: (K, 5) what `log_ratio` is the sum of, in the order of `association.linking.TERMS`.
     """
 
     track_id: IntArray
@@ -25,3 +26,9 @@ class IdentityLinks(NamedTuple):
     t_head: FloatArray
     log_ratio: FloatArray
     probability: FloatArray
+    terms: FloatArray
+
+    def between_tracks(self) -> IdentityLinks:
+        """Return the links that join two causal tracks, without those that leave one as it was."""
+        keep = self.tail != self.head
+        return IdentityLinks(*(column[keep] for column in self))

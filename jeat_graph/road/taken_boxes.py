@@ -14,6 +14,7 @@ from jeat_graph.road.box_rows import BoxConfig, rows_of_log
 from jeat_graph.road.boxes_road import TrackBoxes, each_track
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.sway import steadied
+from jeat_graph.tracking.identities.matching_rows import nearest
 
 _SAME_TRACK = 0.5  # share of a fragment's detections that lie on a track for it to be a part of it
 _FEW = 3  # fewer detections in a row that lie beside their track's boxes are errors, not another's
@@ -27,9 +28,10 @@ def boxes_of_log(
     Where fragments were stitched the table has one identity for several of the log's, and where two vehicles
     were exchanged in hindsight each has what the other took in from then on. So detections of another
     identity belong to the track on whose boxes they lie, at times at which the track has none of its own.
+    Where the table says which causal track each row is of, that counts first.
     """
     sensors = int(log["sensor"].max(initial=-1)) + 1
-    log = steadied(log)
+    log = _renamed(steadied(log), table)
     log = log[np.argsort(log["track_id"], kind="stable")]
     pieces = np.split(log, np.flatnonzero(np.diff(log["track_id"])) + 1) if len(log) else []
     tracks = {int(one.track_id[0]): one for one in each_track(table)}
@@ -54,6 +56,21 @@ def boxes_of_log(
             boxes = rows_of_log(taken, sensors, (camera.width, camera.height), config)
             found.append(TrackBoxes(k, one.t, boxes))
     return found
+
+
+def _renamed(log: RecordArray, table: Trajectories) -> RecordArray:
+    """Return the log with the identities that the table has decided: of the row of its causal track then."""
+    if table.causal_id is None or not len(table):
+        return log
+    order = np.lexsort((table.t, table.causal_id))
+    causal, t, named = table.causal_id[order], table.t[order], table.track_id[order]
+    out = log.copy()
+    for k in np.unique(log["track_id"]).tolist():
+        low, high = np.searchsorted(causal, [k, k + 1]).tolist()
+        if high > low:
+            own = log["track_id"] == k
+            out["track_id"][own] = named[low + nearest(t[low:high], log["t"][own])]
+    return out
 
 
 def _split(rows: RecordArray, track: Trajectories) -> tuple[list[RecordArray], list[RecordArray]]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -109,15 +110,32 @@ def explain_track(config: Config, detections: Detections, track_id: int) -> list
         DataError: there is no such track.
         ConfigError: the configuration's engine has no hypotheses.
     """
-    out: list[TrackMoment] = []
-    for step in _steps(config, detections):
-        row = np.flatnonzero(step.found.track_id == track_id)
-        if len(row):
-            out.append(_moment(step, int(row[0])))
-        elif out:
-            break
-    if not out:
+    found = explain_tracks(config, detections, {track_id})
+    if track_id not in found:
         raise DataError(f"there is no track {track_id}")
+    return found[track_id]
+
+
+def explain_tracks(
+    config: Config, detections: Detections, track_ids: Collection[int]
+) -> dict[int, list[TrackMoment]]:
+    """Return the moments of tracks by their identity, as `explain_track`; without those that there are not.
+
+    Args:
+        config: of the recording.
+        detections: as they were tracked.
+        track_ids: identities of causal tracks.
+
+    Raises:
+        ConfigError: the configuration's engine has no hypotheses.
+    """
+    wanted, out = np.array(sorted(track_ids), dtype=np.int64), dict[int, list[TrackMoment]]()
+    for step in _steps(config, detections):
+        rows = np.flatnonzero(np.isin(step.found.track_id, wanted))
+        for row in rows.tolist():
+            out.setdefault(int(step.found.track_id[row]), []).append(_moment(step, row))
+        if not len(rows) and len(out) == len(wanted):
+            break
     return out
 
 
@@ -169,7 +187,8 @@ def run_to_explain(folder: Path, moved: list[str] | None = None) -> tuple[Config
 
 
 def _steps(config: Config, detections: Detections) -> Iterator[_ReplayedStep]:
-    tracker = Tracker(config)
+    causal = replace(config.smoother, engine="none", identities="causal")
+    tracker = Tracker(replace(config, smoother=causal))
     if not tracker.can_explain:
         raise ConfigError(f"tracker.engine={config.tracker.engine} weighs no hypotheses: nothing to explain")
     for batch in detections.batches():

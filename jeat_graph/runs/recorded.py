@@ -11,6 +11,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.diagnostics import Diagnostics
+from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.data.progress import progress_span
 from jeat_graph.data.tables.reading import ReadingOptions
 from jeat_graph.data.trajectories import Trajectories
@@ -18,6 +19,7 @@ from jeat_graph.eval.judge import Judgement
 from jeat_graph.io.files.beside import check_beside
 from jeat_graph.runs.beside import recorded_frames
 from jeat_graph.runs.directory import DIAGNOSTICS, read_record
+from jeat_graph.runs.run_identities import links_of_run
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +32,7 @@ class RunData:
         causal: the causal table, or None.
         smoothed: the smoothed table, or None.
         diagnostics: how each detection fitted, or None.
+        links: what the smoother joined to one identity; None where identities are those of the causal table.
         judged: scores by kind of table; empty without truth.
         truth_name: file of the truth, or None.
         notes: what the page cannot show, why, and how to get it; one sentence each.
@@ -40,6 +43,7 @@ class RunData:
     causal: Trajectories | None
     smoothed: Trajectories | None
     diagnostics: Diagnostics | None
+    links: IdentityLinks | None = None
     judged: dict[str, Judgement] = field(default_factory=dict)
     truth_name: str | None = None
     notes: tuple[str, ...] = ()
@@ -112,6 +116,7 @@ def load_run_data(
         causal=causal,
         smoothed=smoothed,
         diagnostics=diagnostics,
+        links=links_of_run(folder) if folder.is_dir() else None,
         judged=judged,
         truth_name=None if truth is None else str(truth),
     )

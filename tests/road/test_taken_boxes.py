@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -74,3 +76,17 @@ def test_tracks_that_were_exchanged_have_what_the_other_took_in_from_then_on():
         assert apart.sum() == (np.abs(T - 3.0) > 0.35).sum()
         assert z[apart] == pytest.approx(np.interp(t[apart], T, x))
     assert sum(len(t) for t, _ in found.values()) == 2 * len(T)
+
+
+def test_detections_of_tracks_that_were_exchanged_where_no_place_tells_it_go_by_the_table():
+    """Two that lie within each other's boxes all the time; the causal tracks changed places at 3 s."""
+    near, after = RIGHT + 6.0, T >= 3.0
+    first, second = np.where(after, near, RIGHT), np.where(after, RIGHT, near)
+    table = table_of((1, T, RIGHT), (2, T, near))
+    causal = np.concatenate([np.where(after, 2, 1), np.where(after, 1, 2)])
+    decided = replace(table, causal_id=causal, identity_probability=np.ones(len(causal)))
+    found = taken(log_of((1, T, first), (2, T, second)), decided)
+    assert found[1][1] == pytest.approx(RIGHT)
+    assert found[2][1] == pytest.approx(near)
+    undecided = taken(log_of((1, T, first), (2, T, second)), table)
+    assert undecided[1][1] == pytest.approx(first)

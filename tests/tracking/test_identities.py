@@ -183,8 +183,7 @@ def test_tracks_that_no_decision_changes_keep_their_rows_to_the_byte():
 def test_a_track_is_as_it_was_only_whole_and_alone():
     causal = np.array([1, 1, 2, 2, 3, 4, 4, 5, 6])
     owner = np.array([1, 1, 2, 9, 3, 3, 3, 0, 6])
-    none = np.zeros(0, dtype=np.int64)
-    decision = IdentityDecision(owner, causal, np.ones(9), none, none, np.zeros(0), np.zeros(0))
+    decision = IdentityDecision.without_links(owner, causal)
     assert changed_tracks(decision).tolist() == [False, False, True, True, True, True, True, False, False]
 
 

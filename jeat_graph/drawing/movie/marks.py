@@ -64,14 +64,11 @@ class Canvas:
 
     def dashed_box(self, box: FloatArray, colour: Rgb, thickness: float) -> None:
         """Draw a box (4,) with a broken line."""
-        import cv2
+        self._dashed(self._corners(box), colour, thickness, closed=True)
 
-        pieces = dashes(self._corners(box), _DASH_PX * self.unit, _GAP_PX * self.unit)
-        if len(pieces):
-            lines = list(self._fixed(pieces.reshape(-1, 2)).reshape(-1, 2, 2))
-            cv2.polylines(
-                self.image, lines, False, colour, self._width(thickness), lineType=cv2.LINE_AA, shift=_SHIFT
-            )
+    def dashed_line(self, points: FloatArray, colour: Rgb, thickness: float) -> None:
+        """Draw a broken line through points (C, 2) px."""
+        self._dashed(np.asarray(points) * self._scale, colour, thickness, closed=False)
 
     def ellipse(self, centre: FloatArray, sigma: FloatArray, colour: Rgb) -> None:
         """Draw the ellipse of 2σ around a centre (2,) px; nothing where σ (2,) is not known."""
@@ -136,6 +133,16 @@ class Canvas:
         near = np.clip(points, -_FAR_PX, _FAR_PX)
         return np.rint(near * (1 << _SHIFT)).astype(np.int32)
 
+    def _dashed(self, corners: FloatArray, colour: Rgb, thickness: float, *, closed: bool) -> None:
+        import cv2
+
+        pieces = dashes(corners, _DASH_PX * self.unit, _GAP_PX * self.unit, closed=closed)
+        if len(pieces):
+            lines = list(self._fixed(pieces.reshape(-1, 2)).reshape(-1, 2, 2))
+            cv2.polylines(
+                self.image, lines, False, colour, self._width(thickness), lineType=cv2.LINE_AA, shift=_SHIFT
+            )
+
     def _polyline(self, points: FloatArray, colour: Rgb, width: int, *, closed: bool) -> None:
         import cv2
 
@@ -144,19 +151,21 @@ class Canvas:
         )
 
 
-def dashes(corners: FloatArray, dash: float, gap: float) -> FloatArray:
-    """Cut the outline of a polygon into dashes; each side begins and ends with one.
+def dashes(corners: FloatArray, dash: float, gap: float, *, closed: bool = True) -> FloatArray:
+    """Cut the outline of a polygon, or a line, into dashes; each side begins and ends with one.
 
     Args:
         corners: (C, 2) px.
         dash: wanted length of a dash (px).
         gap: wanted length of the gaps (px).
+        closed: whether the last corner leads to the first.
 
     Returns:
         (D, 2, 2) first and last point of each dash.
     """
     out = []
-    for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+    ends = np.roll(corners, -1, axis=0)
+    for start, end in list(zip(corners, ends, strict=True))[: None if closed else -1]:
         length = float(np.hypot(*(end - start)))
         count = min(max(int((length + gap) // (dash + gap)), 1), 1000)
         # What is left over goes into the gaps.

@@ -11,6 +11,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.drawing.movie.backgrounds import FilmBackground
 from jeat_graph.drawing.movie.captions import Captions
+from jeat_graph.drawing.movie.joins import Joins
 from jeat_graph.drawing.movie.marks import (
     Canvas,
     draw_causal,
@@ -43,6 +44,9 @@ class Movie:
             where it is the same, and for all where nothing is said.
         labels: which tracks have their number beside them: `all`, `thin` (as far as there is room, large
             boxes first) or `none`.
+        captions: what stands beside the tracks; None: their numbers.
+        counters: lines and zones.
+        joins: where causal tracks were joined to one identity, or None.
     """
 
     times: FloatArray
@@ -56,6 +60,7 @@ class Movie:
     ways: Sequence[PictureMap | None] = ()
     captions: Captions | None = None
     counters: Sequence[Counter] = ()
+    joins: Joins | None = None
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -102,6 +107,8 @@ class Movie:
             draw_causal(canvas, back_in(self.causal.at(k), way), trails=self.smoothed is None)
         if self.smoothed is not None:
             draw_smoothed(canvas, back_in(self.smoothed.at(k), way))
+        if self.joins is not None:
+            self.joins.draw(canvas, t, way)
         if self.truth is not None:
             asked_for, ignored = self.truth.at(t)
             for boxes, colour in ((ignored, IGNORED_BOX), (asked_for, TRUE_BOX)):
@@ -118,6 +125,7 @@ class Movie:
             for shown, text in (
                 (self.causal, "solid: causal"),
                 (self.smoothed, "dashed: smoothed"),
+                (self.joins or None, "broken line: joined over a gap"),
                 (self.truth, "thin: truth"),
             )
             if shown is not None

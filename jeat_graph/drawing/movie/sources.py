@@ -24,6 +24,7 @@ from jeat_graph.drawing.movie.backgrounds import (
     VideoBackground,
 )
 from jeat_graph.drawing.movie.captions import PARTS, Captions, read_speeds
+from jeat_graph.drawing.movie.joins import Joins
 from jeat_graph.drawing.movie.moments import TRAIL_S, TracksAt, TruthAt
 from jeat_graph.drawing.movie.panels import Movie
 from jeat_graph.drawing.movie.totals import counters
@@ -34,6 +35,7 @@ from jeat_graph.io.events.trigger_times import TriggerChoice, times_by_triggers
 from jeat_graph.io.media.video import FrameSource, open_frames
 from jeat_graph.rig.common_picture import CommonPicture, Way, common_time
 from jeat_graph.runs.directory import ROAD_CAUSAL, ROAD_SMOOTHED, RUN_JSON, read_record
+from jeat_graph.runs.run_identities import links_of_run
 
 #: Names within a simulated data set, as jeat-graph-sehn writes it: its segments, and their files.
 SEGMENTS, EVENTS, TRUTH = "segments", "events.h5", "gt.csv"
@@ -168,10 +170,19 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         ways=[ways[one.name].picture if one.name in ways else None for one in backgrounds],
         captions=_captions(request, tables),
         counters=counters(request.places, tables.get("smoothed", tables.get("causal"))),
+        joins=_joins(request.run, tables.get("smoothed")),
     )
     warnings += _absent(frames, tables, truth, times)
     warnings += [f"{request.events}: {note}" for note in ([] if events is None else stretches.notes())]
     return movie, rate_hz, warnings
+
+
+def _joins(run: Path | None, smoothed: Trajectories | None) -> Joins | None:
+    """Return what the smoother of a run joined; None where it decided nothing, or is not drawn."""
+    if run is None or not run.is_dir() or smoothed is None or smoothed.causal_id is None:
+        return None
+    links = links_of_run(run)
+    return None if links is None else Joins(smoothed, links)
 
 
 def _frames(request: Request) -> FrameSource:

@@ -14,6 +14,7 @@ from jeat_graph.drawing.page.plane import map_svg
 from jeat_graph.drawing.page.summary import (
     ERRORS_TITLE,
     count_table,
+    link_table,
     most_telling,
     nis_interval,
     score_tables,
@@ -43,6 +44,7 @@ def render_page(data: RunData, compared: ComparedRun | None = None, not_compared
         _numbers(data),
         _tracks(data),
         _comparison(compared),
+        _links(data),
         _list(data),
         _details(data),
         "</main>",
@@ -173,6 +175,20 @@ def _comparison(compared: ComparedRun | None) -> str:
     )
     tables = "".join(table_html(table) for table in compared.tables)
     return f"<h2>Filter against smoother</h2>{figures}{tables}"
+
+
+def _links(data: RunData) -> str:
+    table = link_table(data)
+    if table is None or data.links is None:
+        return ""
+    kept = len(data.links.tail) - len(table.rows)
+    text = (
+        "Identities of the smoothed table were decided again. The log ratio of a link, ln of how much "
+        "likelier both are one object than two, is the sum of the terms behind it. "
+        f"Links within one causal track are not listed: {kept}."
+    )
+    body = table_html(table, tall=True) if len(table.rows) else "<p>No causal tracks were joined.</p>"
+    return f'<h2>Identities</h2><p class="quiet">{escape(text)}</p>{body}'
 
 
 def _list(data: RunData) -> str:

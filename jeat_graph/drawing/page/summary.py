@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from jeat_graph.association.linking import TERMS
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.diagnostics import NIS_FREEDOM
 from jeat_graph.data.trajectories import Trajectories
@@ -121,6 +122,29 @@ def sensor_table(data: RunData) -> Table | None:
         )
     digits = {"mean NIS / 2": 3, "NIS within 95 % bounds (%)": 1}
     return Table.from_records(records, title="Consistency by sensor", digits=digits)
+
+
+def link_table(data: RunData) -> Table | None:
+    """One row for each gap over which causal tracks were joined to one identity; None without decisions."""
+    if data.links is None:
+        return None
+    links = data.links.between_tracks()
+    records: list[dict[str, Cell]] = [
+        {
+            "identity": int(links.track_id[k]),
+            "from track": int(links.tail[k]),
+            "to track": int(links.head[k]),
+            "from (s)": float(links.t_tail[k]),
+            "to (s)": float(links.t_head[k]),
+            "gap (s)": float(links.t_head[k] - links.t_tail[k]),
+            "probability": float(links.probability[k]),
+            "log ratio": float(links.log_ratio[k]),
+            **{name: float(value) for name, value in zip(TERMS, links.terms[k], strict=True)},
+        }
+        for k in range(len(links.tail))
+    ]
+    digits = {"probability": 2} | dict.fromkeys(("log ratio", *TERMS), 1)
+    return Table.from_records(records, title="Causal tracks that were joined", digits=digits)
 
 
 def track_table(data: RunData) -> Table:

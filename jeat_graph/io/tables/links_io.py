@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from jeat_graph.association.linking import TERMS
+from jeat_graph.data.identity_links import IdentityLinks
+from jeat_graph.io.tables.file_tables import read_table
 from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.io.tables.table_writer import write_columns
 
-if TYPE_CHECKING:
-    from jeat_graph.data.identity_links import IdentityLinks
-
+_TERM_COLUMNS = tuple(name.replace(" ", "_") for name in TERMS)
 #: Columns of the file.
 LINK_COLUMNS = (
     "from",
@@ -21,12 +24,13 @@ LINK_COLUMNS = (
     "track_id",
     "t_from",
     "t_to",
+    *_TERM_COLUMNS,
 )
 _DECIMALS = 6
 
 
 def write_links(links: IdentityLinks, path: str | Path) -> None:
-    """Write links: causal identities before and behind a gap (s), ln of the ratio, and the probability."""
+    """Write links: causal identities at both ends of a gap (s), ln of the ratio, its terms, probability."""
     columns: dict[str, Any] = {
         "from": links.tail,
         "to": links.head,
@@ -37,4 +41,22 @@ def write_links(links: IdentityLinks, path: str | Path) -> None:
         "t_from": links.t_tail + 0.0,
         "t_to": links.t_head + 0.0,
     }
+    for name, values in zip(_TERM_COLUMNS, links.terms.T, strict=True):
+        columns[name] = round_decimals(values, _DECIMALS)
     write_columns(columns, path)
+
+
+def read_links(path: str | Path) -> IdentityLinks:
+    """Read links, as `write_links` writes them.
+
+    Raises:
+        DataError: the file cannot be read, or lacks a column.
+    """
+    table = read_table(path, LINK_COLUMNS)
+    whole = {name: table.whole(name) for name in ("track_id", "from", "to")}
+    real = {name: table.number(name) for name in LINK_COLUMNS if name not in whole}
+    terms = np.stack([real[name] for name in _TERM_COLUMNS], axis=1)
+    return IdentityLinks(
+        *(whole["track_id"], whole["from"], whole["to"], real["t_from"], real["t_to"]),
+        *(real["log_ratio"], real["probability"], terms),
+    )

@@ -85,9 +85,7 @@ def match(detections: Detections, rows: CorrectedTracks) -> tuple[IntArray, IntA
 def _along(
     detections: Detections, owner: IntArray, causal: IntArray, like: ModelTracker
 ) -> Iterator[Trajectories]:
-    none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
-    sure = np.ones(len(owner))
-    decision = IdentityDecision(owner, causal, sure, none, none, nothing, nothing)
+    decision = IdentityDecision.without_links(owner, causal)
     # A person says that there is an object; of what is nobody's nothing later is known.
     return retrack(detections, decision, np.where(owner > 0, 1.0, -1.0), like, anew=True)
 

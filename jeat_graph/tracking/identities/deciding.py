@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.association import agreement
-from jeat_graph.association.linking import Joined, Pieces, join
+from jeat_graph.association.linking import TERMS, Joined, Pieces, join
 from jeat_graph.association.path_cover import Links, chains, preferring, sampled_covers, shares
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.model_constants import ModelConstants
@@ -70,6 +70,7 @@ class IdentityDecision:
         tail, head: (K,) detections that the cover joins.
         log_ratio: (K,) ln p(joined)/p(apart).
         joined: (K,) probability.
+        terms: (K, 5) what `log_ratio` is the sum of, in the order of `linking.TERMS`.
     """
 
     owner: IntArray
@@ -79,6 +80,19 @@ class IdentityDecision:
     head: IntArray
     log_ratio: FloatArray
     joined: FloatArray
+    terms: FloatArray
+
+    @classmethod
+    def without_links(cls, owner: IntArray, causal: IntArray) -> IdentityDecision:
+        """Return a decision that joins nothing and is sure of it.
+
+        Args:
+            owner: (N,) identity of each detection.
+            causal: (N,) the causal one.
+        """
+        nothing, none = np.zeros(0), np.zeros(0, dtype=np.int64)
+        sure, no_terms = np.ones(len(owner)), np.zeros((0, len(TERMS)))
+        return cls(owner, causal, sure, none, none, nothing, nothing, no_terms)
 
 
 def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelConstants) -> IdentityDecision:
@@ -100,11 +114,7 @@ def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelCon
     number[told] = np.arange(told.sum())
     piece = number[piece] if len(piece) else piece
     if not (piece >= 0).any():
-        nothing = np.zeros(0)
-        none = np.zeros(0, dtype=np.int64)
-        return IdentityDecision(
-            np.zeros_like(causal), causal, np.ones(len(causal)), none, none, nothing, nothing
-        )
+        return IdentityDecision.without_links(np.zeros_like(causal), causal)
     members = _members(piece)
     found, causal_cover = _joined(recording, members, piece, takers, c)
     cover = preferring(found.links, found.cover, causal_cover, TIE)
@@ -121,7 +131,8 @@ def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelCon
     probability[used] = _together(drawn, found.links, chain, members)[piece[used]]
     tail = np.array([members[k][-1] for k in found.links.tail[made]], dtype=np.int64)
     head = np.array([members[k][0] for k in found.links.head[made]], dtype=np.int64)
-    return IdentityDecision(owner, causal, probability, tail, head, found.links.gain[made], share[made])
+    gain, terms = found.links.gain[made], found.terms[made]
+    return IdentityDecision(owner, causal, probability, tail, head, gain, share[made], terms)
 
 
 def _joined(

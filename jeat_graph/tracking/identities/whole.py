@@ -53,6 +53,7 @@ def _links(decision: IdentityDecision, t: FloatArray) -> IdentityLinks:
         t[head],
         decision.log_ratio[order],
         decision.joined[order],
+        decision.terms[order],
     )
 
 
