@@ -31,47 +31,49 @@ class SeenBoxes(NamedTuple):
     sensor: IntArray
 
 
-def pieces(seen: SeenBoxes, takers: IntArray, share: float) -> IntArray:
+def pieces(seen: SeenBoxes, assignments: IntArray, share: float) -> IntArray:
     """Return the piece (N,) of each detection, numbered by their first ones.
 
     Args:
         seen: the detections.
-        takers: (R, N) which of its tracks took each in every pass; the first one is the causal pass.
+        assignments: (R, N) which of its tracks took each in every pass; the first one is the causal pass.
         share: of the passes that make a link, from which on it stands; always more than half.
     """
     piece = np.arange(len(seen.t))
     for sensor in np.unique(seen.sensor):
         own = np.flatnonzero(seen.sensor == sensor)
-        tail, head, votes = successive(takers[:, own])
-        agreed = (votes >= share * len(takers) - 1e-9) & (2 * votes > len(takers))
+        tail, head, votes = successive(assignments[:, own])
+        agreed = (votes >= share * len(assignments) - 1e-9) & (2 * votes > len(assignments))
         piece[own[head[agreed]]] = own[tail[agreed]]
     piece = _first(piece)
-    return _numbered(_with_sensors_together(seen, takers, piece))
+    return _numbered(_with_sensors_together(seen, assignments, piece))
 
 
-def successive(takers: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+def successive(assignments: IntArray) -> tuple[IntArray, IntArray, IntArray]:
     """Return detections that follow each other on a track: tails (E,), heads (E,), by how many passes (E,).
 
     Args:
-        takers: (R, N) of detections in order of time.
+        assignments: (R, N) of detections in order of time.
     """
-    n = takers.shape[1]
+    n = assignments.shape[1]
     codes = []
-    for taker in takers:
-        order = np.argsort(taker, kind="stable")
+    for assignment in assignments:
+        order = np.argsort(assignment, kind="stable")
         a, b = order[:-1], order[1:]
-        same = taker[a] == taker[b]
+        same = assignment[a] == assignment[b]
         codes.append(a[same] * n + b[same])
     code, votes = np.unique(np.concatenate([*codes, np.zeros(0, dtype=np.int64)]), return_counts=True)
     return code // max(n, 1), code % max(n, 1), votes
 
 
-def votes_between(piece: IntArray, takers: IntArray, starts: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+def votes_between(
+    piece: IntArray, assignments: IntArray, starts: IntArray
+) -> tuple[IntArray, IntArray, IntArray]:
     """Return pieces that follow each other on tracks of the passes, and how many passes say so.
 
     Args:
         piece: (N,) piece of each detection, below 0 for none.
-        takers: (R, N) of every pass.
+        assignments: (R, N) of every pass.
         starts: (P,) first detection of each piece.
 
     Returns:
@@ -79,10 +81,10 @@ def votes_between(piece: IntArray, takers: IntArray, starts: IntArray) -> tuple[
     """
     used = np.flatnonzero(piece >= 0)
     own, count, codes = piece[used], len(starts), []
-    for taker in takers[:, used]:
-        order = np.argsort(taker, kind="stable")
+    for assignment in assignments[:, used]:
+        order = np.argsort(assignment, kind="stable")
         a, b = order[:-1], order[1:]
-        follows = (taker[a] == taker[b]) & (own[a] != own[b]) & (starts[own[b]] == used[b])
+        follows = (assignment[a] == assignment[b]) & (own[a] != own[b]) & (starts[own[b]] == used[b])
         codes.append(np.unique(own[a[follows]] * count + own[b[follows]]))
     code, votes = np.unique(np.concatenate([*codes, np.zeros(0, dtype=np.int64)]), return_counts=True)
     return code // max(count, 1), code % max(count, 1), votes
@@ -105,7 +107,7 @@ def _numbered(labels: IntArray) -> IntArray:
     return rank[code.reshape(-1)]
 
 
-def _with_sensors_together(seen: SeenBoxes, takers: IntArray, piece: IntArray) -> IntArray:
+def _with_sensors_together(seen: SeenBoxes, assignments: IntArray, piece: IntArray) -> IntArray:
     """Return pieces (N,) with those of different sensors joined that the first pass gives to one track.
 
     Those go first of which more passes say so, and in more detections.
@@ -117,9 +119,9 @@ def _with_sensors_together(seen: SeenBoxes, takers: IntArray, piece: IntArray) -
     ends = np.searchsorted(own[order], np.arange(own.max() + 2))
     members = [order[a:b] for a, b in pairwise(ends)]
     found = []
-    for x, y in _beside(seen, takers[:1], own):
-        if _agreement(seen, takers[:1], members[x], members[y])[0] > 0.0:
-            share, number = _agreement(seen, takers, members[x], members[y])
+    for x, y in _beside(seen, assignments[:1], own):
+        if _agreement(seen, assignments[:1], members[x], members[y])[0] > 0.0:
+            share, number = _agreement(seen, assignments, members[x], members[y])
             found.append((-share, -number, x, y))
     group = {k: [k] for k in range(len(members))}
     of = list(range(len(members)))
@@ -134,13 +136,13 @@ def _with_sensors_together(seen: SeenBoxes, takers: IntArray, piece: IntArray) -
     return np.asarray(of, dtype=np.int64)[own]
 
 
-def _beside(seen: SeenBoxes, takers: IntArray, piece: IntArray) -> list[tuple[int, int]]:
+def _beside(seen: SeenBoxes, assignments: IntArray, piece: IntArray) -> list[tuple[int, int]]:
     """Return pairs of pieces of different sensors of which a pass has neighbours in time on one track."""
     count, codes = int(piece.max()) + 1, []
-    for taker in takers:
-        order = np.argsort(taker, kind="stable")
+    for assignment in assignments:
+        order = np.argsort(assignment, kind="stable")
         a, b = order[:-1], order[1:]
-        near = (taker[a] == taker[b]) & (seen.sensor[a] != seen.sensor[b])
+        near = (assignment[a] == assignment[b]) & (seen.sensor[a] != seen.sensor[b])
         near &= seen.t[b] - seen.t[a] <= _BESIDE_S
         x, y = piece[a[near]], piece[b[near]]
         codes.append(np.unique(np.minimum(x, y) * count + np.maximum(x, y)))
@@ -148,14 +150,14 @@ def _beside(seen: SeenBoxes, takers: IntArray, piece: IntArray) -> list[tuple[in
     return [(int(one) // count, int(one) % count) for one in code]
 
 
-def _agreement(seen: SeenBoxes, takers: IntArray, x: IntArray, y: IntArray) -> tuple[float, int]:
+def _agreement(seen: SeenBoxes, assignments: IntArray, x: IntArray, y: IntArray) -> tuple[float, int]:
     """Return the share of passes that give two pieces to one track while both are there, and of how many."""
     low = max(seen.t[x[0]], seen.t[y[0]]) - _BESIDE_S
     high = min(seen.t[x[-1]], seen.t[y[-1]]) + _BESIDE_S
     x, y = (one[(seen.t[one] >= low) & (seen.t[one] <= high)] for one in (x, y))
     if not len(x) or not len(y):
         return 0.0, 0
-    same = [_usual(taker[x]) == _usual(taker[y]) for taker in takers]
+    same = [_usual(assignment[x]) == _usual(assignment[y]) for assignment in assignments]
     return float(np.mean(same)), min(len(x), len(y))
 
 

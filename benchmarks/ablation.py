@@ -60,7 +60,7 @@ TERMS: dict[str, dict[str, Any]] = {
         "camera_scale_bounds": (1e-6, 1e-6),
     },
     "the lasting part of it going over to the tracks": {"camera_time_s": _FIRM},
-    "the indifference point (fixed at even odds)": {"indifference_offset": 0.0, "indifference_slope": 0.0},
+    "the decision threshold (fixed at even odds)": {"threshold_offset": 0.0, "threshold_slope": 0.0},
     "objects that a sensor never sees": {"unseen_share": _NEVER, "unseen_bounds": (_NEVER, _NEVER)},
     "objects that it does not see while they stand": {
         "stationary_unseen_share": _NEVER,

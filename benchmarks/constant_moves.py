@@ -28,7 +28,7 @@ PROBABILITIES = frozenset(
     {
         *("cut_share", "uncovered_share", "clutter_memory", "clutter_precision"),
         *("p_detect", "chance_hit", "unseen_share", "stationary_unseen_share", "shared_false"),
-        *("noise_share", "peak_share", "repeat_overlap", "repeat_share", "repeat_told", "best_share"),
+        *("noise_share", "peak_share", "repeat_overlap", "repeat_share", "repeat_trusted", "best_share"),
         *("gap_overlap", "sure", "camera_memory", "confirming", "report", "inside_share", "rival"),
         *("false_posterior", "least_presence", "outside_share"),
     }

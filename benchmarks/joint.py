@@ -203,7 +203,7 @@ def demo_scores(preset: str, order: Sequence[str] | None, digits: int) -> dict[s
         fed: set[int] = set()
         for scans in _steps(batch, order):
             table = tracker.step(scans)
-            fed |= set(tracker.takers(sum(map(len, scans))).tolist())
+            fed |= set(tracker.assigned(sum(map(len, scans))).tolist())
         tables.append(table)  # the answer of a time is that after its last scan
         if preset == "paper" and len(batch) > 1:
             one, other = _twins(tracker)

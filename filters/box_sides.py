@@ -8,8 +8,8 @@ Errors have heavy tails (Student's t, Roth, Özkan and Gustafsson, ICASSP 2013: 
 (ν + 4)/(ν + d²)), and an occluder may cut one side inwards, whose error says nothing of the object: both
 sides measure, or only the left, or only the right one (a mixture, whose probabilities divide R side by side).
 Where a detector's boxes end at the edge of the picture, a side there that lies inwards of what is expected
-measures nothing but that the object reaches as far (`unmeasured`). Shapes: N tracks, M boxes; axis 0 is x,
-side 0 is left or top; boxes here are left, top, right, bottom (px).
+measures nothing but that the object reaches as far (`unmeasured_sides`). Shapes: N tracks, M boxes; axis 0
+is x, side 0 is left or top; boxes here are left, top, right, bottom (px).
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class SideInnovations(NamedTuple):
         d2: (N, M, 2) squared Mahalanobis distance by axis.
         H: (N, 2, 2, 7) measurement matrix by axis.
         side_variance: (N, 2) variance of one measured side by axis (px²).
-        gone: (N, M, 2, 2) sides that measure nothing.
+        unmeasured: (N, M, 2, 2) sides that measure nothing.
     """
 
     y: FloatArray
@@ -65,7 +65,7 @@ class SideInnovations(NamedTuple):
     d2: FloatArray
     H: FloatArray
     side_variance: FloatArray
-    gone: BoolArray
+    unmeasured: BoolArray
 
 
 def corners(mean: FloatArray) -> FloatArray:
@@ -163,10 +163,10 @@ def innovations(
     H, R = measurement_matrix(size), side_variance(size, log_variance, c)
     S = with_variance(H @ covariance @ H.transpose(0, 1, 3, 2), R, R)
     y = by_axis(boxes)[None] - by_axis(expected_corners(mean))[:, None]
-    gone = unmeasured(y, edges)
-    more = cut_variance(gone, size[:, None], c)
+    unmeasured = unmeasured_sides(y, edges)
+    more = cut_variance(unmeasured, size[:, None], c)
     S = with_variance(np.repeat(S[:, None], len(boxes), axis=1), more[..., 0], more[..., 1])
-    return SideInnovations(y, S, squared_distance(y, S), H, R, gone)
+    return SideInnovations(y, S, squared_distance(y, S), H, R, unmeasured)
 
 
 def at_edge(boxes: FloatArray, picture: tuple[float, float], c: ModelConstants) -> BoolArray:
@@ -181,7 +181,7 @@ def beyond_edge(boxes: FloatArray, picture: tuple[float, float], c: ModelConstan
     return np.asarray(out.max(axis=1, initial=-np.inf) > c.edge_px)
 
 
-def unmeasured(y: FloatArray, edges: BoolArray) -> BoolArray:
+def unmeasured_sides(y: FloatArray, edges: BoolArray) -> BoolArray:
     """Return which sides (..., 2, 2) measure nothing: those at the edge, inwards of the expected ones.
 
     Args:
@@ -239,7 +239,7 @@ def measured_variance(
     S: FloatArray,
     R: FloatArray,
     size: FloatArray,
-    gone: BoolArray,
+    unmeasured: BoolArray,
     c: ModelConstants,
 ) -> FloatArray:
     """Return the variance (N, 2, 2) by axis and side with which an update takes each side (px²).
@@ -249,7 +249,7 @@ def measured_variance(
         S: (N, 2, 2, 2) their covariances.
         R: (N, 2) variances of the sides as assumed (px²).
         size: (N, 2) width and height (px).
-        gone: (N, 2, 2) sides that measure nothing.
+        unmeasured: (N, 2, 2) sides that measure nothing.
         c: constants.
     """
     heavy = 1.0 / student_weight(squared_distance(y, S).sum(axis=1), c)
@@ -257,7 +257,7 @@ def measured_variance(
     # Where a cut explains the innovation, what is left fits and has no heavy tail.
     tail = np.where(cut.sum(axis=2) > 0.5, 1.0, heavy[:, None])
     variance = (R * tail)[..., None] / np.maximum(1.0 - cut, _LEAST_PROBABILITY)
-    return np.asarray(np.where(gone, ((_UNMEASURED * size) ** 2)[..., None], variance))
+    return np.asarray(np.where(unmeasured, ((_UNMEASURED * size) ** 2)[..., None], variance))
 
 
 def uncover(
@@ -265,7 +265,7 @@ def uncover(
     covariance: FloatArray,
     y: FloatArray,
     S: FloatArray,
-    gone: BoolArray,
+    unmeasured: BoolArray,
     c: ModelConstants,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return states, covariances and innovations that know nothing of sides which had been cut so far.
@@ -279,7 +279,7 @@ def uncover(
         covariance: (N, 2, 7, 7).
         y: (N, 2, 2) innovations by axis and side.
         S: (N, 2, 2, 2) their covariances.
-        gone: (N, 2, 2) sides that measure nothing; their axes stay as they are.
+        unmeasured: (N, 2, 2) sides that measure nothing; their axes stay as they are.
         c: constants.
     """
     mean, covariance, left_over, size = mean.copy(), covariance.copy(), y.copy(), expected_size(mean)
@@ -289,7 +289,7 @@ def uncover(
     other = alone[..., ::-1] - np.log(size)[..., None] + math.log(c.uncovered_share)
     out = np.stack([-y[..., 0], y[..., 1]], axis=-1)
     shows = (out > 0.0) & (out < c.most_uncovered * size[..., None]) & (other > both[..., None])
-    shows &= ~gone.any(axis=2, keepdims=True)
+    shows &= ~unmeasured.any(axis=2, keepdims=True)
     for side, sign in enumerate((-1.0, 1.0)):
         d = np.where(shows[..., side], out[..., side], 0.0)
         whole = expected_size(mean) + d

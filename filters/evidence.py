@@ -191,10 +191,10 @@ def expect_hits(
         evidence: before.
         p_detect: (N,) P_D of the sensor for each track.
         sees: (N,) probability that it is not blind to the track.
-        clock: of the look; looks closer together than `full_look_s` are not one each.
+        clock: of the look; looks closer together than `full_scan_s` are not one each.
         c: constants.
     """
-    expected = p_detect * sees * min(1.0, clock.period_s / c.full_look_s)
+    expected = p_detect * sees * min(1.0, clock.period_s / c.full_scan_s)
     return replace(evidence, missed=evidence.missed + expected)
 
 

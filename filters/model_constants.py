@@ -75,7 +75,7 @@ class ModelConstants:
         track_p_detect_bounds: of a track's own mean, in association.
         track_p_detect_memory_s: memory of a track's own hits and misses (s).
         p_detect_count: objects that the prior of the sensor's mean counts for.
-        looks_count: looks from which on an object counts no more for that mean.
+        scan_count: scans from which on an object counts no more for that mean.
         chance_hit: probability of a hit on what a sensor cannot see.
         unseen_share: share of real objects that a sensor never sees. Prior.
         unseen_bounds: of the learnt share: "the one never sees it" and "the other invents it" explain the
@@ -100,16 +100,16 @@ class ModelConstants:
         unknown_score: score of a box that has none.
         repeat_overlap: IoU from which on a box comes again at its place.
         repeat_share: prior share of the best boxes that come again.
-        repeat_told: share of the best boxes below which the counts say less and less: all moves far from one
-            scan to the next.
+        repeat_trusted: share of the best boxes below which the counts say less and less: all moves far from
+            one scan to the next.
         repeat_count: boxes that this prior counts for, in each score bin.
         best_share: of the boxes, by score, that are the yardstick.
-        indifference_offset, indifference_slope: a_s = −(offset + slope · z), z the logit below which fewer
+        threshold_offset, threshold_slope: θ_s = offset + slope · z, z the logit below which fewer
             than half as many come again as of the best. Measured.
-        indifference_bounds: of z.
+        threshold_bounds: of z.
         visible_to_hidden, hidden_to_visible, visible_to_gone, hidden_to_gone: rates of the chain of presence
         (1/s).
-        full_look_s: a sensor whose looks are closer together than this expects less of each (s).
+        full_scan_s: a sensor whose looks are closer together than this expects less of each (s).
         gap_prior: a gap of u expected detections ends well with exp(−u / this). Prior.
         gap_prior_count: gaps that the prior counts for.
         gap_prior_least: shortest u of the prior.
@@ -200,7 +200,7 @@ class ModelConstants:
     track_p_detect_bounds: tuple[float, float] = (0.02, 0.98)
     track_p_detect_memory_s: float = 1.5
     p_detect_count: float = 6.0
-    looks_count: float = 5.0
+    scan_count: float = 5.0
     chance_hit: float = 0.02
     unseen_share: float = 0.2
     unseen_bounds: tuple[float, float] = (0.2, 0.9)
@@ -225,18 +225,18 @@ class ModelConstants:
     unknown_score: float = 0.8
     repeat_overlap: float = 0.4
     repeat_share: float = 0.8
-    repeat_told: float = 0.3
+    repeat_trusted: float = 0.3
     repeat_count: float = 4.0
     best_share: float = 0.3
-    indifference_offset: float = 0.4
-    indifference_slope: float = 0.85
-    indifference_bounds: tuple[float, float] = (-1.0, 3.0)
+    threshold_offset: float = 0.4
+    threshold_slope: float = 0.85
+    threshold_bounds: tuple[float, float] = (-1.0, 3.0)
 
     visible_to_hidden: float = 0.3
     hidden_to_visible: float = 2.0
     visible_to_gone: float = 0.1
     hidden_to_gone: float = 0.3
-    full_look_s: float = 0.02
+    full_scan_s: float = 0.02
     gap_prior: float = 4.5
     gap_prior_count: float = 4.0
     gap_prior_least: float = 0.3

@@ -41,8 +41,8 @@ _MOST_LOG_ODDS = 30.0
 _ROUNDS = 2
 # A track with fewer misses than this, one hit and no gain is too young to say what it is (correlation times).
 _LEAST_MISSES = 0.2
-# Looks in correlation times from which on a track says whether a sensor sees it.
-_LEAST_LOOKS = 1.0
+# Scans, in correlation times, from which on a track says whether a sensor sees it.
+_LEAST_SCANS = 1.0
 
 
 class SensorBelief(NamedTuple):
@@ -52,7 +52,7 @@ class SensorBelief(NamedTuple):
         p_detect: (S,) mean P_D of objects that it sees.
         unseen: (S,) share g of real objects that it never sees.
         stationary_unseen: (S,) share b of the others that it does not see while they stand.
-        indifference: (S,) a: logit + a is the log odds that a box is real.
+        decision_threshold: (S,) θ (logit): logit − θ is the log odds that a box is real.
         prior_odds: (S,) π: log odds that what it finds is real; shares how often "false" explains a find.
         agreed_mean, agreed_std: (S,) mean and standard deviation of its scores (logits) of tracks that
             another sensor finds as well.
@@ -63,7 +63,7 @@ class SensorBelief(NamedTuple):
     p_detect: FloatArray
     unseen: FloatArray
     stationary_unseen: FloatArray
-    indifference: FloatArray
+    decision_threshold: FloatArray
     prior_odds: FloatArray
     agreed_mean: FloatArray
     agreed_std: FloatArray
@@ -79,7 +79,7 @@ class LogOddsTerms(NamedTuple):
     Attributes:
         other: (N,) that hypothesis: a sensor's index where it is a persistent false object of that sensor,
             −1 where it is noise.
-        looks: (N, S) hits and misses of each sensor, and what its finding something is worth.
+        hits_and_misses: (N, S) hits and misses of each sensor, and what its finding something is worth.
         scores: (N, S) the scores of its boxes.
         second_box: (N,) overlap with a better track, ≤ 0.
         motion: (N,) how well later detections lay where they were predicted; 0 where the other is no noise.
@@ -87,7 +87,7 @@ class LogOddsTerms(NamedTuple):
     """
 
     other: IntArray
-    looks: FloatArray
+    hits_and_misses: FloatArray
     scores: FloatArray
     second_box: FloatArray
     motion: FloatArray
@@ -95,7 +95,7 @@ class LogOddsTerms(NamedTuple):
 
     def total(self) -> FloatArray:
         """Return the sum (N,), the log odds."""
-        sums = self.looks.sum(axis=1) + self.scores.sum(axis=1)
+        sums = self.hits_and_misses.sum(axis=1) + self.scores.sum(axis=1)
         return np.asarray(sums + self.second_box + self.motion + self.rest)
 
 
@@ -137,9 +137,9 @@ def beta_binomial(
 
 
 def score_log_odds(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> FloatArray:
-    """Return η (N, S): a plus the track's score, once a track, times `testimony`; 0 where never found."""
+    """Return η (N, S): the track's score less θ, once a track, times `testimony`; 0 where never found."""
     score = track_scores(evidence, c)
-    given = sensors.indifference + score
+    given = score - sensors.decision_threshold
     weighed = np.where(given > 0.0, given * testimony(evidence, score, sensors, c), given)
     return np.where(evidence.found, weighed, 0.0)
 
@@ -230,8 +230,11 @@ def _weights(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> _W
     while_moving = while_moving + np.where((moved[0] <= 0.0) & (moved[1] <= 0.0), birth, 0.0)
     at_times = np.logaddexp(while_moving, np.log1p(-sensors.stationary_unseen) + seen)
     # Who never stood is one that it sees, or does not.
-    told = stood[0] + stood[1] > 0.0
-    while_moving, at_times = np.where(told, while_moving, -np.inf), np.where(told, at_times, seen)
+    informative = stood[0] + stood[1] > 0.0
+    while_moving, at_times = (
+        np.where(informative, while_moving, -np.inf),
+        np.where(informative, at_times, seen),
+    )
     scores = score_log_odds(evidence, sensors, c)
     prior = np.where(found, sensors.prior_odds, 0.0)
     # What a sensor finds by chance has the scores of clutter; but no track begins by chance.
@@ -274,7 +277,7 @@ def log_odds_terms(evidence: Evidence, sensors: SensorBelief, c: ModelConstants)
     odds = math.log(sensors.noise_share / (1.0 - sensors.noise_share))
     return LogOddsTerms(
         other=other,
-        looks=w.object_seen - counted - against,
+        hits_and_misses=w.object_seen - counted - against,
         scores=counted,
         second_box=w.second_box,
         motion=np.where(is_noise, evidence.gained - odds, 0.0),
@@ -287,30 +290,30 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
 
     Args:
         evidence: of living tracks and of the last that ended.
-        sensors: what was believed before; indifference points stay as they are.
+        sensors: what was believed before; decision thresholds stay as they are.
         c: constants.
     """
     if not len(evidence):
         return sensors
-    looks = evidence.hits + evidence.misses
+    scans = evidence.hits + evidence.misses
     stood = evidence.stationary_hits + evidence.stationary_misses
     grown = (evidence.last_s > evidence.born_s) | (evidence.gained > 0.0)
-    told = grown | (evidence.misses.sum(axis=1) > _LEAST_MISSES)
+    informative = grown | (evidence.misses.sum(axis=1) > _LEAST_MISSES)
     score = track_scores(evidence, c)
     trust = evidence.found * np.clip(evidence.detections / c.weight_hits, *c.weight_bounds)[:, None]
     for _ in range(_ROUNDS):
         belief = posterior(evidence, sensors, c)
         real = belief.real[:, None]
         seen, blind = real * (1.0 - belief.unseen), belief.stationary_unseen
-        weight = seen * np.minimum(1.0, c.looks_count / np.maximum(looks, _LEAST_WEIGHT))
+        weight = seen * np.minimum(1.0, c.scan_count / np.maximum(scans, _LEAST_WEIGHT))
         hits = weight * (evidence.hits - blind * evidence.stationary_hits)
-        p_detect = _share(hits, weight * (looks - blind * stood), c.p_detect, c.p_detect_count)
-        weight = seen * (stood > _LEAST_LOOKS)
+        p_detect = _share(hits, weight * (scans - blind * stood), c.p_detect, c.p_detect_count)
+        weight = seen * (stood > _LEAST_SCANS)
         stationary = _share(weight * blind, weight, c.stationary_unseen_share, c.sensor_count)
-        weight = real * (looks > _LEAST_LOOKS)
+        weight = real * (scans > _LEAST_SCANS)
         unseen = _share(weight * belief.unseen, weight, c.unseen_share, c.sensor_count)
-        false = (1.0 - belief.real)[told]
-        noise = _share(false * belief.noise[told], false, c.noise_share, c.sensor_count)
+        false = (1.0 - belief.real)[informative]
+        noise = _share(false * belief.noise[informative], false, c.noise_share, c.sensor_count)
         odds = ((trust * real).sum(axis=0) + c.sensor_count) / (
             (trust * (1.0 - real)).sum(axis=0) + c.sensor_count
         )
@@ -319,7 +322,7 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
             p_detect=np.clip(p_detect, *c.p_detect_bounds),
             unseen=np.clip(unseen, *c.unseen_bounds),
             stationary_unseen=np.clip(stationary, *c.stationary_unseen_bounds),
-            indifference=sensors.indifference,
+            decision_threshold=sensors.decision_threshold,
             prior_odds=np.log(odds),
             agreed_mean=agreed[0],
             agreed_std=agreed[1],
@@ -334,7 +337,7 @@ def _agreed_scores(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return mean and standard deviation of each sensor's scores (S,) where others agree, and their share."""
     sees = (evidence.hits > 0.0) * (1.0 - blindness(evidence.hits, evidence.misses, sensors, c))
-    weight = sees * np.minimum(1.0, evidence.hits / _LEAST_LOOKS)
+    weight = sees * np.minimum(1.0, evidence.hits / _LEAST_SCANS)
     for s in range(score.shape[1]):
         weight[:, s] *= np.delete(sees, s, axis=1).max(axis=1, initial=0.0)
     total = weight.sum(axis=0)

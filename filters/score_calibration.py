@@ -1,9 +1,9 @@
-"""At which score a sensor's box is as likely real as not: its indifference point.
+"""At which score a sensor's box is as likely real as not: its decision threshold.
 
 What is real is there again in the next scan, and was there in the one before. So for each score the share of
 boxes is counted that come again at their place (IoU) in both neighbouring scans, relative to that of the
-sensor's best boxes. z₀ is the logit below which that share is under one half, and the indifference point in
-logits is −a, a = −(b₀ + b₁ · clip(z₀)), with b₀ and b₁ measured on real detectors.
+sensor's best boxes. z₀ is the logit below which that share is under one half, and the decision threshold in
+logits is θ = b₀ + b₁ · clip(z₀), with b₀ and b₁ measured on real detectors.
 False boxes that repeat make z₀ too low: it bounds, and hits, misses and other sensors tell the rest.
 """
 
@@ -65,7 +65,7 @@ def logit(score: FloatArray) -> FloatArray:
     return np.asarray(np.log(bounded / (1.0 - bounded)))
 
 
-def box_probability(boxes: FloatArray, logits: FloatArray, indifference: float) -> FloatArray:
+def box_probability(boxes: FloatArray, logits: FloatArray, threshold: float) -> FloatArray:
     """Return the probability (M,) of each box to be an object by itself, whatever is tracked there.
 
     Its odds are those of its score, times 1 − IoU with the most overlapping better box of the scan: of two
@@ -74,11 +74,11 @@ def box_probability(boxes: FloatArray, logits: FloatArray, indifference: float) 
     Args:
         boxes: (M, 4) left, top, right, bottom of one scan (px).
         logits: (M,) of their scores.
-        indifference: a of the sensor; a + logit is the log odds by score.
+        threshold: θ of the sensor; logit − θ is the log odds by score.
     """
     overlap = np.where(logits[None] > logits[:, None], intersection_over_union(boxes, boxes), 0.0)
     apart = 1.0 - overlap.max(axis=1, initial=0.0)
-    odds = np.exp(indifference + logits) * apart
+    odds = np.exp(logits - threshold) * apart
     return np.asarray(odds / (1.0 + odds))
 
 
@@ -119,17 +119,17 @@ def half_as_many(counts: RepeatCounts, c: ModelConstants) -> float:
     best[-1] = True
     top = (repeated[best].sum() + _BEST_COUNT * c.repeat_share) / (total[best].sum() + _BEST_COUNT)
     # Where even the best hardly come again, since all moves far from one scan to the next, counts say little.
-    told = total * min(1.0, (top / c.repeat_told) ** 2)
+    trusted = total * min(1.0, (top / c.repeat_trusted) ** 2)
     prior = c.repeat_count * c.repeat_share
-    share = (told * repeated / (total * top + _LEAST_BOXES) + prior) / (told + c.repeat_count)
+    share = (trusted * repeated / (total * top + _LEAST_BOXES) + prior) / (trusted + c.repeat_count)
     low = np.flatnonzero(share < 0.5)
     return float(SCORE_GRID[low[-1] if len(low) else 0])
 
 
-def indifference(counts: RepeatCounts, c: ModelConstants) -> float:
-    """Return a: logit + a is the log odds that a box is real, by its score alone."""
-    z = float(np.clip(half_as_many(counts, c), *c.indifference_bounds))
-    return -(c.indifference_offset + c.indifference_slope * z)
+def decision_threshold(counts: RepeatCounts, c: ModelConstants) -> float:
+    """Return θ: logit − θ is the log odds that a box is real, by its score alone."""
+    z = float(np.clip(half_as_many(counts, c), *c.threshold_bounds))
+    return c.threshold_offset + c.threshold_slope * z
 
 
 def _kernel(logits: FloatArray) -> FloatArray:

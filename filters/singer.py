@@ -168,7 +168,7 @@ def in_perspective(F: FloatArray, mean: FloatArray, dt: float, c: ModelConstants
     return out
 
 
-def told_motion(mean: FloatArray, c: ModelConstants) -> FloatArray:
+def reported_motion(mean: FloatArray, c: ModelConstants) -> FloatArray:
     """Return what tables tell of states (..., 2, 7): the motion (..., 2, 5) of the box as detectors have it.
 
     What lasts of the detectors' errors is in place and size: smoothed, a box without that follows the model's
@@ -184,8 +184,8 @@ def told_motion(mean: FloatArray, c: ModelConstants) -> FloatArray:
     return out
 
 
-def told_covariance(mean: FloatArray, covariance: FloatArray, c: ModelConstants) -> FloatArray:
-    """Return the covariance (..., 2, 5, 5) of what `told_motion` tells.
+def reported_covariance(mean: FloatArray, covariance: FloatArray, c: ModelConstants) -> FloatArray:
+    """Return the covariance (..., 2, 5, 5) of what `reported_motion` tells.
 
     J P Jᵀ with the derivatives of the acceleration, 2 g − 1/τ_v by v, 1 by a and v by r, plus v² Var(r) of
     the other axis, from which half of g comes. Place and size vary as those of the object do.

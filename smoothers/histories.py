@@ -34,7 +34,7 @@ class StepRecord(NamedTuple):
 
     Attributes:
         t: its time (s).
-        begins_anew: whether all tracks had ended before it.
+        is_reset: whether all tracks had ended before it.
         track_id: (N,) the tracks after it, before any of them ended, ascending.
         scans: of its scans in the order they were taken in, each with the first of these tracks: those that
             had been born.
@@ -50,7 +50,7 @@ class StepRecord(NamedTuple):
     """
 
     t: float
-    begins_anew: bool
+    is_reset: bool
     track_id: IntArray
     scans: list[FilterRecord]
     real: FloatArray
@@ -191,14 +191,14 @@ class Histories:
     Args:
         lag_s: fixed lag (s); infinite for whole tracks.
         existence: which rows are given.
-        told: how states are told.
+        output: how states are told.
         solver: of the states; our own pass if None.
     """
 
     def __init__(
-        self, lag_s: float, existence: Existence, told: RowOutput, solver: Solver | None = None
+        self, lag_s: float, existence: Existence, output: RowOutput, solver: Solver | None = None
     ) -> None:
-        self._lag_s, self._existence, self._told = lag_s, existence, told
+        self._lag_s, self._existence, self._output = lag_s, existence, output
         self._solver: Solver = RtsSolver() if solver is None else solver
         self._living: list[History] = []
         self._ended: list[tuple[History, GapCounts]] = []
@@ -216,7 +216,7 @@ class Histories:
         Raises:
             ValueError: it is not the step behind the last one.
         """
-        if record.begins_anew:
+        if record.is_reset:
             self.end_all(record.gaps)
         ids = record.track_id.tolist()
         if [one.track_id for one in self._living] != ids[: len(self._living)]:
@@ -384,11 +384,11 @@ class Histories:
             final = float(real.max())
         count = int(np.searchsorted(t, until, side="right"))
         gap, before = whole_gaps(confirmed, missed, last), max(history.missed, 0.0)
-        told = np.flatnonzero(last[:count])
-        nearer = np.minimum(missed[told], gap[told] - np.concatenate([[before], missed[told]])[:-1])
-        given = told <= (seen[-1] if len(seen) else -1)
-        given &= ~np.isin(told, same)  # a later step of the same time tells more
-        rows = told[given]
+        settled = np.flatnonzero(last[:count])
+        nearer = np.minimum(missed[settled], gap[settled] - np.concatenate([[before], missed[settled]])[:-1])
+        given = settled <= (seen[-1] if len(seen) else -1)
+        given &= ~np.isin(settled, same)  # a later step of the same time tells more
+        rows = settled[given]
         around, known = known_around(later, last, history.later, count)
         turned = np.minimum(final, around[rows])
         found = np.flatnonzero(real > c.report)
@@ -404,9 +404,9 @@ class Histories:
             (states[0][rows], states[1][rows]),
             is_real,
             used[rows],
-            self._told,
+            self._output,
         )
-        return table, count, float(missed[told[-1]]) if len(told) else before, known
+        return table, count, float(missed[settled[-1]]) if len(settled) else before, known
 
 
 def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> TrackUpdate:
@@ -451,8 +451,8 @@ def _entries(columns: Sequence[FloatArray]) -> list[TrackUpdate]:
     if len({len(one) for one in columns}) != 1 or not all(np.isfinite(one).all() for one in columns):
         raise ValueError("its updates are none")
     made = []
-    for t, F, before, before_cov, mean, covariance, *said in zip(*columns, strict=True):
-        sensor, real, used, confirmed, missed, later, last = (float(one) for one in said)
+    for t, F, before, before_cov, mean, covariance, *rest in zip(*columns, strict=True):
+        sensor, real, used, confirmed, missed, later, last = (float(one) for one in rest)
         size = mean.shape[-1] if mean.ndim == 2 else -1
         square = (len(mean), size, size)
         shapes = {before_cov.shape, covariance.shape}

@@ -10,7 +10,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 #: Numbers that are told of a track along an axis: place, velocity, acceleration, ln size and its rate.
-TOLD = 5
+REPORTED = 5
 #: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time, number of
 #: the class, and its share of the votes.
 ModelRows: TypeAlias = tuple[
@@ -44,7 +44,7 @@ def rows_of(
     states: tuple[FloatArray, FloatArray],
     real: FloatArray,
     used: IntArray,
-    told: RowOutput,
+    output: RowOutput,
 ) -> ModelRows:
     """Return rows (N,).
 
@@ -54,10 +54,10 @@ def rows_of(
         states: means (N, 2, D) and covariances (N, 2, D, D).
         real: (N,) posteriors.
         used: (N,) bits of the sensors that found it at that time.
-        told: how the states are told.
+        output: how the states are told.
     """
-    variance = np.diagonal(told.covariance(*states), axis1=2, axis2=3)
-    flat = told.mean(states[0]).reshape(-1, 2 * TOLD), variance.reshape(-1, 2 * TOLD)
+    variance = np.diagonal(output.covariance(*states), axis1=2, axis2=3)
+    flat = output.mean(states[0]).reshape(-1, 2 * REPORTED), variance.reshape(-1, 2 * REPORTED)
     given, label = (np.array([one[k] for one in called], dtype=np.int64) for k in (0, 1))
     share = np.array([one.share for one in called], dtype=np.float64)
     return t, given, *flat, real, used, label, share
@@ -65,7 +65,7 @@ def rows_of(
 
 def joined(parts: Sequence[ModelRows]) -> ModelRows:
     """Return rows one behind the other."""
-    nothing, whole, state = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 2 * TOLD))
+    nothing, whole, state = np.zeros(0), np.zeros(0, np.int64), np.zeros((0, 2 * REPORTED))
     none: ModelRows = (nothing, whole, state, state, nothing, whole, whole, nothing)
     t, ids, mean, variance, real, used, label, share = zip(none, *parts, strict=True)
     return (

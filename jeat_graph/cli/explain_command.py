@@ -153,7 +153,7 @@ def _said_of_place(place: PlaceStory, at: tuple[float, float, float], form: str)
     lines = [f"{where}: boxes of sensors: {len(place.boxes)}, tracks: {len(place.tracks)}"]
     if place.boxes:
         boxes: list[dict[str, Cell]] = [
-            {"t": one.t, "sensor": one.sensor, "score": one.score, "went to track": one.taker}
+            {"t": one.t, "sensor": one.sensor, "score": one.score, "went to track": one.track_id}
             for one in place.boxes
         ]
         lines += ["", Table.from_records(boxes, title="Boxes", digits={"t": 3}).render(form).rstrip()]

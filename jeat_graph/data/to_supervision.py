@@ -73,16 +73,16 @@ class OwnDetections(NamedTuple):
 
     Attributes:
         detections: as they were given.
-        taker: (R,) identity of the track, 0 where none took it.
+        assigned: (R,) identity of the track, 0 where none took it.
     """
 
     detections: Any
-    taker: IntArray
+    assigned: IntArray
 
     def of(self, track_id: IntArray) -> OwnDetections:
         """Return those that some tracks took."""
-        rows = np.flatnonzero(np.isin(self.taker, track_id))
-        return OwnDetections(self.detections[rows], self.taker[rows])
+        rows = np.flatnonzero(np.isin(self.assigned, track_id))
+        return OwnDetections(self.detections[rows], self.assigned[rows])
 
     def with_tracks(self, track_id: IntArray) -> Any:
         """Return all of them, with masks, data and whatever else they have, and with `tracker_id`.
@@ -90,6 +90,6 @@ class OwnDetections(NamedTuple):
         Args:
             track_id: (N,) tracks that are reported; of a detection that none of these took it is -1.
         """
-        out = self.detections[np.arange(len(self.taker))]
-        out.tracker_id = np.where(np.isin(self.taker, track_id), self.taker, NO_TRACK).astype(int)
+        out = self.detections[np.arange(len(self.assigned))]
+        out.tracker_id = np.where(np.isin(self.assigned, track_id), self.assigned, NO_TRACK).astype(int)
         return out

@@ -29,6 +29,6 @@ def write_export(request: ExportRequest) -> str:
         raise DataError(f"unknown export {request.to!r}; known: {', '.join(found)}")
     for name in SOME_TAKE:
         if getattr(request, name) is not None and name not in found[request.to].options:
-            takers = " or ".join(one.name for one in found.values() if name in one.options)
-            raise DataError(f"--{name.replace('_', '-')} is for --to {takers}, not {request.to}")
+            supporting = " or ".join(one.name for one in found.values() if name in one.options)
+            raise DataError(f"--{name.replace('_', '-')} is for --to {supporting}, not {request.to}")
     return found[request.to].write(request)

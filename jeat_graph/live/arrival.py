@@ -23,7 +23,7 @@ class Arrival(NamedTuple):
         repeated: those that had been taken before a checkpoint from which the tracker went on.
         held: those that wait, because their time is far from all others (`live.jump_s`).
         refuted: earlier ones that waited and are passed over now.
-        anew: whether time has begun anew, because all scans were too late for long: all tracks have ended.
+        reset: whether time has begun anew, because all scans were too late for long: all tracks have ended.
         leapt: whether time goes on much later, because scans ahead of time confirmed each other.
         taken: the scans that were taken, those that had waited too; times without the sensors' latency.
         waiting: those that wait for a sensor whose scans come later (`live.wait_s`).
@@ -39,7 +39,7 @@ class Arrival(NamedTuple):
     repeated: list[Scan]
     held: list[Scan]
     refuted: list[Scan]
-    anew: bool
+    reset: bool
     leapt: bool = False
     taken: Sequence[Scan] = ()
     waiting: Sequence[Scan] = ()
@@ -79,6 +79,6 @@ class Taken(NamedTuple):
     late_s: float
 
 
-def looked_last(tracker: Tracker) -> list[str]:
+def scanned_last(tracker: Tracker) -> list[str]:
     """Names of the sensors that gave the scans of a tracker's last step."""
-    return [name for name, t in tracker.last_looks().items() if t == tracker.time]
+    return [name for name, t in tracker.last_scans().items() if t == tracker.time]

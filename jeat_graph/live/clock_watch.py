@@ -161,7 +161,7 @@ class ClockWatch:
                 self._window, self._done, self._work = {}, 0, None
         if len(self._met) == 1 and not self._settled and not self._waits_for_another():
             self._settled = list(self._met)  # it is alone, and what it says is not kept any longer
-            self._begin_anew()
+            self._reset()
 
     def stepped(self, sensor: str, step_s: float, std_s: float, at_s: float) -> FoundClock:
         """Take a step of a sensor's clock off its times, and have that compared with the others' boxes.
@@ -174,7 +174,7 @@ class ClockWatch:
         """
         before = self.lag_s(sensor)
         self.clocks[sensor] = {"lag_s": round(before + step_s, 6), "std_s": std_s, "at_s": at_s}
-        self._begin_anew()
+        self._reset()
         if sensor in self._settled and len(self._settled) > 1:
             self._settled.remove(sensor)
             self._again = True
@@ -190,7 +190,7 @@ class ClockWatch:
         elif t - self._settled_at >= AGAIN_S:
             self._settled_at = None
             self._settled, self._again = self._settled[:1], True
-            self._begin_anew()
+            self._reset()
 
     def _waits_for_another(self) -> bool:
         """Whether there is but one sensor, and that not for long."""
@@ -198,7 +198,7 @@ class ClockWatch:
             return False
         return all(one.newest - one.begun < WINDOW_S for one in self._heard.values())
 
-    def _begin_anew(self) -> None:
+    def _reset(self) -> None:
         """Forget what was heard: there is another time, or all is known."""
         self._heard, self._last, self._compared = {}, {}, 0
         self._window, self._done, self._work = {}, 0, None
@@ -213,7 +213,7 @@ class ClockWatch:
             one.odd += 1
             if one.odd < _BELIEVED:
                 return 0
-            self._begin_anew()
+            self._reset()
             one = self._heard[scan.sensor] = _Heard(t)
         elif t < one.newest + _APART_S:
             return 0
@@ -268,7 +268,7 @@ class ClockWatch:
         if agree or sure:
             self._settled += fresh
         if taken or len(self._settled) == len(self._met):
-            self._begin_anew()
+            self._reset()
             self._again = self._again and len(self._settled) < len(self._met)
         return ClockNews(taken, newest, lines) if taken or lines else None
 

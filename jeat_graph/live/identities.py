@@ -69,7 +69,7 @@ class Identities:
         self,
         first: int,
         next_own: int,
-        takers: Sequence[IntArray],
+        by_step: Sequence[IntArray],
         known: Sequence[IntArray],
         unsettled: int = 0,
     ) -> list[IntArray]:
@@ -78,30 +78,30 @@ class Identities:
         Args:
             first: number of the first track that can have been born in them.
             next_own: number of the next track to be born after them.
-            takers: (M,) of each step, the own number of the track that took each detection; 0 if none did.
+            by_step: (M,) of each step, the own number of the track that took each detection; 0 if none did.
             known: (M,) of each step, the identity whose track took it the time before; 0 if none did.
             unsettled: number of the first track that the smoothers have not been told of.
 
         Returns:
             `known` for the next time: an identity is remembered where nobody takes the detection now.
         """
-        taker = takers[0] if len(takers) == 1 else np.concatenate(takers)
+        assigned = by_step[0] if len(by_step) == 1 else np.concatenate(by_step)
         before = known[0] if len(known) == 1 else np.concatenate(known)
-        if not first == next_own == self._next_own and not self._stays(first, next_own, taker, before):
-            self._give(first, next_own, taker, before, unsettled)
+        if not first == next_own == self._next_own and not self._stays(first, next_own, assigned, before):
+            self._give(first, next_own, assigned, before, unsettled)
         after = before.copy()
-        taken = taker > 0
-        after[taken] = self.of(taker[taken])
-        if len(takers) == 1:
+        taken = assigned > 0
+        after[taken] = self.of(assigned[taken])
+        if len(by_step) == 1:
             return [after]
-        return np.split(after, np.cumsum([len(one) for one in takers[:-1]]))
+        return np.split(after, np.cumsum([len(one) for one in by_step[:-1]]))
 
-    def _stays(self, first: int, next_own: int, taker: IntArray, before: IntArray) -> bool:
+    def _stays(self, first: int, next_own: int, assigned: IntArray, before: IntArray) -> bool:
         """Whether each track has been born again by its own number: mostly so, and soon seen."""
         if next_own != self._next_own:
             return False
         known = before > 0
-        tracks, names = taker[known], before[known]
+        tracks, names = assigned[known], before[known]
         # With 0 for nobody the first place is found, whose number is not 0.
         rows = np.searchsorted(self._own, tracks)
         if not ((self._own[rows] == tracks) & (self._given[rows] == names)).all():
@@ -110,7 +110,7 @@ class Identities:
         born[tracks[tracks >= first] - first] = True
         return bool(born.all())
 
-    def _give(self, first: int, next_own: int, taker: IntArray, before: IntArray, unsettled: int) -> None:
+    def _give(self, first: int, next_own: int, assigned: IntArray, before: IntArray, unsettled: int) -> None:
         """Match the tracks since `first` one to one with those from before; the rest get new identities."""
         cut = int(np.searchsorted(self._own, first))
         own = np.append(self._own[:cut], np.arange(first, next_own))
@@ -120,11 +120,11 @@ class Identities:
         if before.any():
             # What nobody has been told of may still turn out to be the vehicle of an identity given out.
             open_ = ~shown & (own >= unsettled)
-            taken = np.flatnonzero((taker > 0) & (before > 0) & ~np.isin(before, given[~open_]))
-            taken = taken[open_[np.searchsorted(own, taker[taken])]]
+            taken = np.flatnonzero((assigned > 0) & (before > 0) & ~np.isin(before, given[~open_]))
+            taken = taken[open_[np.searchsorted(own, assigned[taken])]]
             itself = open_ & (given > 0)
             track, name = most_shared(
-                np.append(taker[taken], own[itself]), np.append(before[taken], given[itself]), answered
+                np.append(assigned[taken], own[itself]), np.append(before[taken], given[itself]), answered
             )
             given[open_] = 0
             given[np.searchsorted(own, track)] = name

@@ -19,7 +19,7 @@ from jeat_graph.data.arrays import RecordArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.live.arrival import Admitted, Arrival, Taken, looked_last
+from jeat_graph.live.arrival import Admitted, Arrival, Taken, scanned_last
 from jeat_graph.live.clock_steps import ClockSteps, Judged
 from jeat_graph.live.clock_watch import ClockNews, ClockWatch
 from jeat_graph.live.lateness import LatenessCounter
@@ -89,9 +89,9 @@ class LiveTracker(OneAtATime):
         self._base = TimeBase(config.live.jump_s)
         self._repetition = Repetition(self._base, whole=tracker.time is None)
         self._rewinding = Rewinding(tracker)
-        tracker.logs_takers = policy == REWIND
+        tracker.logs_assigned = policy == REWIND
         # Where nothing is taken again: sensors of the newest scans, and what the smoothers are to know.
-        self._newest = looked_last(tracker)
+        self._newest = scanned_last(tracker)
         self._due: list[PendingStep | None] = []
         # Of a tracker that has taken scans: to before its time nobody can go back.
         self._begun = -math.inf if tracker.time is None else tracker.time, self._newest
@@ -205,7 +205,7 @@ class LiveTracker(OneAtATime):
         taken = self._take_all(decision.take)
         self.lateness.arrived(taken, decision.refuted, before)
         self._hand_over()
-        if any(one.good for one in taken) and not (decision.leapt or decision.anew):
+        if any(one.good for one in taken) and not (decision.leapt or decision.reset):
             self._base.took(before, self.tracker.time)
         return Admitted(scans, decision, taken, self.tracker.time or 0.0, self._answer())
 
@@ -224,7 +224,7 @@ class LiveTracker(OneAtATime):
             repeated=repeated,
             held=[scan for part in admitted if not part.decision.take for scan in part.scans],
             refuted=[scan for one in decisions for scan in one.refuted],
-            anew=any(one.anew for one in decisions),
+            reset=any(one.reset for one in decisions),
             leapt=any(one.leapt for one in decisions),
             taken=[scan for one in taken for scan in one.good],
             earlier=[(part.t, part.table, part.late_s) for part in admitted[:-1] if part.taken],
@@ -280,21 +280,21 @@ class LiveTracker(OneAtATime):
         if now is not None and t < now and self.policy == REFUSE:
             return Decision(batch, [])
         late = not any(self._may_come(scan) for scan in batch)
-        last_look = {}
+        last_scan = {}
         if late or not self._base.near(t, now):
-            last_look = self.tracker.last_looks()
-        decision = self._base.decide(batch, now, late, last_look)
-        if decision.leapt or decision.anew:
+            last_scan = self.tracker.last_scans()
+        decision = self._base.decide(batch, now, late, last_scan)
+        if decision.leapt or decision.reset:
             self._repetition.begins()
             if self._room is not None:  # what waits is of the time before
                 self._take_all(self._room.clear())
                 self._room.jumped(t)
-        if decision.anew:
+        if decision.reset:
             self._rewinding.settle(math.inf)
             self._rewinding.settled, self._newest, self._begun = -math.inf, [], (-math.inf, [])
             first = min(scan.t for scan in decision.take)
             self._repetition.begins(first)
-            self.tracker.begin_anew(first)
+            self.tracker.reset(first)
         return decision
 
     def save(self, path: str | Path, more: dict[str, Any] | None = None) -> None:

@@ -203,8 +203,8 @@ class Duplicates:
         k = _whose(counts, t)
         of = counts[k]
         known = seq in of.recent or seq <= of.top - self.WINDOW
-        anew = t > of.newest and (known or (seq < of.top and seq < min(of.recent)))
-        if came is not True and (anew or (known and came is False)):
+        restarted = t > of.newest and (known or (seq < of.top and seq < min(of.recent)))
+        if came is not True and (restarted or (known and came is False)):
             self.restarts[source] = self.restarts.get(source, 0) + 1
             self.seen[source] = [of, Numbering(seq, {seq}, t)]
             return True

@@ -52,7 +52,7 @@ class Rewinding:
     """Puts scans where they belong in the order of time, by taking the steps behind them again.
 
     Args:
-        tracker: the tracker, new or loaded; it must log takers (`logs_takers`) when scans are inserted.
+        tracker: the tracker, new or loaded; it must log takers (`logs_assigned`) when scans are inserted.
 
     Attributes:
         steps: the steps that may still be taken again, by time.
@@ -95,13 +95,13 @@ class Rewinding:
         if later and later[0].t == t:
             step = _joined(self.steps.pop(k), step)
         self.steps.insert(k, step)
-        takers = []
+        assigned = []
         try:
             for step in self.steps[k:]:
                 if step is not self.steps[k]:
                     step.before, step.living = tracker.snapshot(), tracker.living()
                 step.taken = tracker.take_in(step.scans)
-                takers.append(tracker.takers(len(step.known)))
+                assigned.append(tracker.assigned(len(step.known)))
         except Exception:
             self.steps[k:] = later
             tracker.restore(now)
@@ -109,7 +109,7 @@ class Rewinding:
         again = self.steps[k:]
         known = [step.known for step in again]
         births = again[0].living[1], tracker.num_born + 1
-        known = self.identities.follow(*births, takers, known, self.steps[0].living[1])
+        known = self.identities.follow(*births, assigned, known, self.steps[0].living[1])
         for step, identities in zip(again, known, strict=True):
             step.known = identities
         self.replayed += len(again) - 1

@@ -162,7 +162,7 @@ class Session:
         self.count += 1
         self.flat += message.batch.flat
         self._told.arrived(arrival, message.source, before, place)
-        if arrival.anew or arrival.leapt:
+        if arrival.reset or arrival.leapt:
             self._health.jumped(arrival.t)
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)

@@ -70,13 +70,13 @@ class Decision(NamedTuple):
         take: scans to be taken now, those that waited first.
         refuted: scans that waited and are passed over.
         leapt: whether a row ahead was believed: time goes on there.
-        anew: whether a row behind was believed: time begins anew there.
+        reset: whether a row behind was believed: time begins anew there.
     """
 
     take: list[Scan]
     refuted: list[Scan]
     leapt: bool = False
-    anew: bool = False
+    reset: bool = False
 
 
 class TimeBase:
@@ -112,7 +112,7 @@ class TimeBase:
         return any(other.t == scan.t and other.sensor == scan.sensor for w in self.row for other in w.scans)
 
     def decide(
-        self, scans: Sequence[Scan], now: float | None, late: bool, last_look: dict[str, float]
+        self, scans: Sequence[Scan], now: float | None, late: bool, last_scan: dict[str, float]
     ) -> Decision:
         """Decide what becomes of a message.
 
@@ -120,7 +120,7 @@ class TimeBase:
             scans: those of the message that have not come before.
             now: the newest time so far (s), None before the first scan.
             late: whether none of them can be taken: they are too late, or have come before.
-            last_look: time of each sensor's last scan that was taken (s).
+            last_scan: time of each sensor's last scan that was taken (s).
         """
         t = max(scan.t for scan in scans)
         far = not self.near(t, now)
@@ -131,7 +131,7 @@ class TimeBase:
             return Decision([] if far else list(scans), [])
         known = {name for w in self.row for name in w.sensors} | set(sensors)
         alone = t > now and all(
-            look < now - self.bound_s for name, look in last_look.items() if name not in known
+            look < now - self.bound_s for name, look in last_scan.items() if name not in known
         )
         refuted = self.clear() if self.row and abs(t - self.row[-1].t) > self._apart_s(now, alone) else []
         self.row.append(Witness(t, sensors, list(scans) if far else []))
@@ -176,7 +176,7 @@ class TimeBase:
         # Steps within the row are pauses that its messages confirm; the jump to it is none.
         self._pauses.extend(min(b.t - a.t, _FARTHEST_S) for a, b in pairwise(row) if b.t > a.t)
         self.leap = (now, min(scan.t for scan in take)) if ahead else None
-        return Decision(take, refuted, leapt=ahead, anew=not ahead)
+        return Decision(take, refuted, leapt=ahead, reset=not ahead)
 
     def state(self) -> dict[str, Any]:
         """Return plain data, for `set_state`."""

@@ -76,7 +76,7 @@ class Told:
 
     def _times(self, arrival: Arrival, before: float | None) -> None:
         """Tell of scans whose time was proved wrong, and of a time that goes on elsewhere."""
-        if arrival.anew:
+        if arrival.reset:
             self._warn(
                 "warning: scans have been too late for long, so a clock was set back: all tracks end, and "
                 f"time goes on from t = {arrival.t:.3f} s"

@@ -44,10 +44,10 @@ def boxes_of_log(
         strays += away
     for rows in strays:
         k = int(rows["track_id"][0])
-        takers = [other for other, one in tracks.items() if other != k and _belongs(rows, one, own[other])]
+        owners = [other for other, one in tracks.items() if other != k and _belongs(rows, one, own[other])]
         # What lies on no other track is the track's own: a vehicle may stray from its smoothed boxes.
-        for taker in takers or [k]:
-            own.get(taker, []).append(rows)
+        for owner in owners or [k]:
+            own.get(owner, []).append(rows)
     found = []
     for k, one in tracks.items():
         if own[k]:

@@ -69,14 +69,14 @@ class BoxThere(NamedTuple):
         sensor: its name.
         score: of the box.
         box: (4,) left, top, width, height (px).
-        taker: the track that took it.
+        track_id: the track that took it.
     """
 
     t: float
     sensor: str
     score: float
     box: FloatArray
-    taker: int
+    track_id: int
 
 
 class PlaceStory(NamedTuple):
@@ -94,7 +94,7 @@ class PlaceStory(NamedTuple):
 class _ReplayedStep(NamedTuple):
     t: float
     batch: list[Scan]
-    takers: list[IntArray]
+    assigned: list[IntArray]
     found: Hypotheses
 
 
@@ -162,12 +162,12 @@ def explain_place(
             continue
         if step.t > t + within_s:
             break
-        for scan, takers in zip(step.batch, step.takers, strict=True):
+        for scan, assigned in zip(step.batch, step.assigned, strict=True):
             for k in np.flatnonzero(_contain(scan.boxes, x, y)):
-                score, taker = float(scan.scores[k]), int(takers[k])
-                boxes.append(BoxThere(scan.t, scan.sensor, score, scan.boxes[k], taker))
+                score, track_id = float(scan.scores[k]), int(assigned[k])
+                boxes.append(BoxThere(scan.t, scan.sensor, score, scan.boxes[k], track_id))
         wanted = _contain(step.found.boxes, x, y)
-        wanted |= np.isin(step.found.track_id, [one.taker for one in boxes])
+        wanted |= np.isin(step.found.track_id, [one.track_id for one in boxes])
         for row in np.flatnonzero(wanted):
             tracks[int(step.found.track_id[row])] = _moment(step, int(row))
     return PlaceStory(boxes, tracks)
@@ -194,15 +194,15 @@ def _steps(config: Config, detections: Detections) -> Iterator[_ReplayedStep]:
     for batch in detections.batches():
         tracker.step(batch)
         ends = np.cumsum([len(scan) for scan in batch])[:-1]
-        takers = np.split(tracker.takers(sum(map(len, batch))), ends)
-        yield _ReplayedStep(batch[0].t, list(batch), takers, tracker.hypotheses())
+        assigned = np.split(tracker.assigned(sum(map(len, batch))), ends)
+        yield _ReplayedStep(batch[0].t, list(batch), assigned, tracker.hypotheses())
 
 
 def _moment(step: _ReplayedStep, row: int) -> TrackMoment:
     found, terms = step.found, step.found.terms
     named = {}
     for k, name in enumerate(found.sensors):
-        named[f"{name}: looks"] = float(terms.looks[row, k])
+        named[f"{name}: hits and misses"] = float(terms.hits_and_misses[row, k])
         named[f"{name}: scores"] = float(terms.scores[row, k])
     named["motion"] = float(terms.motion[row])
     named["second box"] = float(terms.second_box[row])

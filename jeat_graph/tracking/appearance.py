@@ -31,7 +31,7 @@ _MOST_WEIGHT = 4096.0  # of cosines that are remembered; then all count half
 _SAME, _OTHER = 0, 1
 
 
-class Looks(NamedTuple):
+class Appearances(NamedTuple):
     """What has been seen so far. Its arrays are never written to: a step makes others.
 
     Attributes:
@@ -45,23 +45,23 @@ class Looks(NamedTuple):
     moments: FloatArray
 
     @staticmethod
-    def start(num_sensors: int, numbers: int) -> Looks:
+    def start(num_sensors: int, numbers: int) -> Appearances:
         """Return what is known before the first embedding of so many numbers."""
         none = np.zeros(0, dtype=np.int64)
-        return Looks(none, np.zeros((0, num_sensors, numbers)), np.zeros((num_sensors, 2, 3)))
+        return Appearances(none, np.zeros((0, num_sensors, numbers)), np.zeros((num_sensors, 2, 3)))
 
-    def of(self, living: IntArray) -> Looks:
+    def of(self, living: IntArray) -> Appearances:
         """Return the same of the tracks that live now (N,), ascending."""
         if np.array_equal(living, self.track_id):
             return self
         living = living.copy()
-        return Looks(living, carried_over(self.mean, self.track_id, living), self.moments)
+        return Appearances(living, carried_over(self.mean, self.track_id, living), self.moments)
 
-    def among(self, num_sensors: int) -> Looks:
+    def among(self, num_sensors: int) -> Appearances:
         """Return the same where there are more sensors, which have seen nothing yet."""
         more = num_sensors - len(self.moments)
         mean = np.pad(self.mean, ((0, 0), (0, more), (0, 0)))
-        return Looks(self.track_id, mean, np.pad(self.moments, ((0, more), (0, 0), (0, 0))))
+        return Appearances(self.track_id, mean, np.pad(self.moments, ((0, more), (0, 0), (0, 0))))
 
     def ratio(self) -> tuple[FloatArray, FloatArray]:
         """Return the slope (S,) of ln of the likelihood ratio over the cosine, and where (S,) that is 0."""
@@ -78,79 +78,79 @@ class Compared(NamedTuple):
     """The detections of one time beside the tracks before it.
 
     Attributes:
-        looks: of these tracks.
+        appearance: of these tracks.
         embeddings: (M, E) of the detections; 0 where there is none.
         sensor: (M,) their sensors.
         cosine: (N, M) of each pair, NaN where one of both is unknown.
         log_ratio: (N, M) ln of the likelihood ratio, 0 where it is unknown.
     """
 
-    looks: Looks
+    appearance: Appearances
     embeddings: FloatArray
     sensor: IntArray
     cosine: FloatArray
     log_ratio: FloatArray
 
 
-def embeddings_of(looks: Looks | None, batch: Sequence[Scan]) -> EmbeddingArray | None:
+def embeddings_of(appearance: Appearances | None, batch: Sequence[Scan]) -> EmbeddingArray | None:
     """Return the embeddings (M, E) of the detections of a batch, None if none has any.
 
     Raises:
         DataError: they have more or fewer numbers than those before.
     """
     found = join_embeddings([scan.embeddings for scan in batch], [len(scan) for scan in batch])
-    if found is None or looks is None or found.shape[1] == looks.mean.shape[2]:
+    if found is None or appearance is None or found.shape[1] == appearance.mean.shape[2]:
         return found
-    before = looks.mean.shape[2]
+    before = appearance.mean.shape[2]
     raise DataError(f"embeddings must have {before} numbers as those before, not {found.shape[1]}")
 
 
-def compare(looks: Looks, embeddings: EmbeddingArray, sensor: IntArray, most: float) -> Compared:
+def compare(appearance: Appearances, embeddings: EmbeddingArray, sensor: IntArray, most: float) -> Compared:
     """Compare detections with the living tracks.
 
     Args:
-        looks: of these tracks.
+        appearance: of these tracks.
         embeddings: (M, E) of unit length, NaN where there is none.
         sensor: (M,) sensor index of each.
         most: greatest absolute value of ln of the ratio.
     """
     found = np.nan_to_num(embeddings.astype(np.float64))
-    length = np.sqrt(np.einsum("nse,nse->ns", looks.mean, looks.mean))[:, sensor]
+    length = np.sqrt(np.einsum("nse,nse->ns", appearance.mean, appearance.mean))[:, sensor]
     known = (length > 0.0) & found.any(axis=1)
     cosine = np.full(known.shape, np.nan)
     for s in np.unique(sensor):
         columns = sensor == s
-        cosine[:, columns] = looks.mean[:, s] @ found[columns].T
+        cosine[:, columns] = appearance.mean[:, s] @ found[columns].T
     cosine = np.where(known, cosine / np.where(known, length, 1.0), np.nan)
-    slope, middle = looks.ratio()
+    slope, middle = appearance.ratio()
     ratio = np.where(known, slope[sensor] * (np.where(known, cosine, 0.0) - middle[sensor]), 0.0)
-    return Compared(looks, found, sensor, cosine, np.clip(ratio, -most, most))
+    return Compared(appearance, found, sensor, cosine, np.clip(ratio, -most, most))
 
 
-def remember(compared: Compared, takers: IntArray, detection: IntArray, living: IntArray) -> Looks:
+def remember(compared: Compared, assigned: IntArray, detection: IntArray, living: IntArray) -> Appearances:
     """Return what is known after a step.
 
     Args:
         compared: its detections beside the tracks before it.
-        takers: (K,) tracks that took a detection each.
+        assigned: (K,) tracks that took a detection each.
         detection: (K,) its index among all.
         living: (N,) the tracks after it, ascending.
     """
-    now = compared.looks.of(living)
+    now = compared.appearance.of(living)
     mean, found = now.mean.copy(), compared.embeddings
-    row, there = places(takers, living)
+    row, there = places(assigned, living)
     use = np.flatnonzero(there & found[detection].any(axis=1))
     row, used = row[use], detection[use]
     sensor = compared.sensor[used]
     known: BoolArray = np.any(mean[row, sensor], axis=1, keepdims=True)
     mean[row, sensor] = np.where(known, _KEPT * mean[row, sensor] + (1.0 - _KEPT) * found[used], found[used])
-    return Looks(now.track_id, mean, _learnt(compared, takers, detection))
+    return Appearances(now.track_id, mean, _learnt(compared, assigned, detection))
 
 
-def _learnt(compared: Compared, takers: IntArray, detection: IntArray) -> FloatArray:
+def _learnt(compared: Compared, assigned: IntArray, detection: IntArray) -> FloatArray:
     """The moments with this step's cosines; all tracks that did not take a detection weigh as one."""
-    moments = compared.looks.moments.copy()
-    row, there = places(takers, compared.looks.track_id)
+    moments = compared.appearance.moments.copy()
+    row, there = places(assigned, compared.appearance.track_id)
     row, detection = row[there], detection[there]
     place = np.arange(len(row))
     cosine = compared.cosine[:, detection]

@@ -16,7 +16,7 @@ from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.files.packing import Codec, pack, plain_codec, unpack
 from jeat_graph.io.files.state_file import read_state_file, write_state_file
-from jeat_graph.tracking.appearance import Looks
+from jeat_graph.tracking.appearance import Appearances
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.engine import StepBoxes
@@ -24,13 +24,15 @@ from jeat_graph.tracking.first_sight import wider
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 36
+FORMAT = 37
 _MAGIC, _WHAT = "jeat-graph tracker", "saved tracker"
 
 
 def _codecs() -> dict[str, Codec]:
     """All classes that a file may name."""
-    return {kind.__name__: plain_codec(kind) for kind in (ClassTally, Detections, Looks, Scan, StepBoxes)}
+    return {
+        kind.__name__: plain_codec(kind) for kind in (ClassTally, Detections, Appearances, Scan, StepBoxes)
+    }
 
 
 def save_state(path: str | Path, config: Config, state: dict[str, Any]) -> None:

@@ -84,23 +84,23 @@ class ClassTally(NamedTuple):
         """Return the tally before the first vote."""
         return ClassTally(np.zeros(0, dtype="U1"), np.zeros(0, dtype=np.int64), np.zeros((0, 0)))
 
-    def after(self, living: IntArray, takers: IntArray, votes: Votes | None) -> ClassTally:
+    def after(self, living: IntArray, assigned: IntArray, votes: Votes | None) -> ClassTally:
         """Return the tally after a step.
 
         Args:
             living: (N,) identities of the tracks after it, ascending.
-            takers: (M,) tracks that took a detection each; some may have ended in the same step.
+            assigned: (M,) tracks that took a detection each; some may have ended in the same step.
             votes: the M votes, or None.
         """
         tally = self._aligned(living)
-        if votes is None or not len(takers):
+        if votes is None or not len(assigned):
             return tally
-        row, there = places(takers, living)
-        said = np.flatnonzero(there & (votes.classes != ""))
-        if not len(said):
+        row, there = places(assigned, living)
+        named = np.flatnonzero(there & (votes.classes != ""))
+        if not len(named):
             return tally
         names, weight = tally.names, tally.weight
-        called = votes.classes[said]
+        called = votes.classes[named]
         column = np.searchsorted(names, called)
         if not len(names) or not (names[np.minimum(column, len(names) - 1)] == called).all():
             names = np.union1d(names, called)
@@ -109,7 +109,7 @@ class ClassTally(NamedTuple):
             column = np.searchsorted(names, called)
         elif tally is self:
             weight = weight.copy()
-        np.add.at(weight, (row[said], column), votes.weights[said])
+        np.add.at(weight, (row[named], column), votes.weights[named])
         return ClassTally(names, tally.track_id, weight)
 
     def _aligned(self, living: IntArray) -> ClassTally:
@@ -145,10 +145,10 @@ def check_names(tally: ClassTally | None, batch: Sequence[Scan]) -> None:
         DataError: there are more than `MOST_CLASSES`.
     """
     known = np.zeros(0, dtype="U1") if tally is None else tally.names
-    said = [scan.classes for scan in batch if scan.classes is not None]
-    if len(known) + sum(map(len, said)) <= MOST_CLASSES or not said:
+    named = [scan.classes for scan in batch if scan.classes is not None]
+    if len(known) + sum(map(len, named)) <= MOST_CLASSES or not named:
         return
-    if len(np.union1d(known, np.concatenate(said))) > MOST_CLASSES:
+    if len(np.union1d(known, np.concatenate(named))) > MOST_CLASSES:
         raise DataError(f"more than {MOST_CLASSES} names of classes: is it classes that these are?")
 
 
@@ -162,8 +162,8 @@ def number_classes(known: dict[str, int], batch: Sequence[Scan]) -> dict[str, in
     Returns:
         The numbers after it; the same dict where there is nothing new.
     """
-    said = {name for scan in batch if scan.classes is not None for name in scan.classes.tolist()}
-    fresh = said - {""} - known.keys()
+    named = {name for scan in batch if scan.classes is not None for name in scan.classes.tolist()}
+    fresh = named - {""} - known.keys()
     if not fresh:
         return known
     out = numbered(sorted(fresh), known)

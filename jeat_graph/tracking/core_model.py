@@ -47,25 +47,25 @@ class CoreModel(OneModel):
         self._model = core.Model(constants, *size, known, math.inf if by_records else lag_of(config))
         super().__init__(constants, config, by_records)
 
-    def declare_sensor(self, name: str, said: SensorConfig) -> None:
-        """Add a sensor that has not looked yet."""
-        self._model.declare_sensor(even_logit_of(said))
+    def declare_sensor(self, name: str, declared: SensorConfig) -> None:
+        """Add a sensor that has had no scan yet."""
+        self._model.declare_sensor(even_logit_of(declared))
 
-    def take(self, looked: StepInput) -> None:
+    def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time."""
-        sides = np.concatenate([looked.boxes[:, :2], looked.boxes[:, :2] + looked.boxes[:, 2:]], axis=1)
-        alike = None if looked.alike is None else np.ascontiguousarray(looked.alike)
-        owners = None if looked.owners is None else np.ascontiguousarray(looked.owners)
-        logits = logit(looked.scores)
+        sides = np.concatenate([inputs.boxes[:, :2], inputs.boxes[:, :2] + inputs.boxes[:, 2:]], axis=1)
+        similarity = None if inputs.similarity is None else np.ascontiguousarray(inputs.similarity)
+        owners = None if inputs.owners is None else np.ascontiguousarray(inputs.owners)
+        logits = logit(inputs.scores)
         self._model.take(
-            looked.t, looked.sensors, looked.numbers, sides, logits, alike, looked.motion, owners
+            inputs.t, inputs.sensors, inputs.numbers, sides, logits, similarity, inputs.motion, owners
         )
 
-    def begin_anew(self, t: float) -> None:
+    def reset(self, t: float) -> None:
         """End all tracks and go on from another time (s)."""
         if self._histories is not None:
             self._histories.end_all(GapCounts(*self._model.gaps()))
-        self._model.begin_anew(t)
+        self._model.reset(t)
 
     def number_on_from(self, identity: int) -> None:
         """Give no new track a smaller identity."""
@@ -99,9 +99,9 @@ class CoreModel(OneModel):
         """Return the identities (N,) of the tracks of the last step, before any ended."""
         return self._model.living()
 
-    def takers(self) -> IntArray:
+    def assigned(self) -> IntArray:
         """Return the identity of the track (M,) that took each box of the last step."""
-        return self._model.takers()
+        return self._model.assigned()
 
     def rows(self) -> ModelRows:
         """Return the tracks that the last step reports."""
@@ -115,9 +115,9 @@ class CoreModel(OneModel):
         """Return how well the boxes of the last step fitted."""
         return self._model.fit()
 
-    def last_looks(self) -> FloatArray:
-        """Return when each sensor (S,) looked last (s)."""
-        return self._model.last_looks()
+    def last_scans(self) -> FloatArray:
+        """Return the time of each sensor's (S,) last scan (s)."""
+        return self._model.last_scans()
 
     def picture(self) -> tuple[float, float] | None:
         """Return width and height of the picture (px), as far as is known."""
@@ -133,14 +133,14 @@ class CoreModel(OneModel):
 
     def learnt(self) -> Learnt:
         """Return what is believed of the sensors and the scene."""
-        said = self._model.learnt()
-        column = {name: _column(said[name]) for name in said.keys() - {"process_noise"}}
+        learnt = self._model.learnt()
+        column = {name: _column(learnt[name]) for name in learnt.keys() - {"process_noise"}}
         return Learnt(
             belief=SensorBelief(
                 p_detect=column["p_detect"],
                 unseen=column["unseen"],
                 stationary_unseen=column["stationary_unseen"],
-                indifference=column["indifference"],
+                decision_threshold=column["decision_threshold"],
                 prior_odds=column["prior_odds"],
                 agreed_mean=column["agreed_mean"],
                 agreed_std=column["agreed_std"],
@@ -154,7 +154,7 @@ class CoreModel(OneModel):
             offsets=column["offsets"],
             boxes_at_edge=column["boxes_at_edge"],
             boxes_beyond=column["boxes_beyond"],
-            process_noise=singer.ProcessNoise(*_column(said["process_noise"]).tolist()),
+            process_noise=singer.ProcessNoise(*_column(learnt["process_noise"]).tolist()),
         )
 
     def record(self) -> Recorded:
@@ -164,7 +164,7 @@ class CoreModel(OneModel):
     def step_record(self, record: Recorded) -> StepRecord:
         """Return the states of a step."""
         own = _own_record(record)
-        t, begins_anew, real, used, confirmed, missed, kept, later = own.told()
+        t, is_reset, real, used, confirmed, missed, kept, later = own.fields()
         codes, counts, born_before, *states = own.scans(self._model)
         ids = own.track_ids()
         starts, scans = np.concatenate([[0], np.cumsum(counts)]).tolist(), []
@@ -189,7 +189,7 @@ class CoreModel(OneModel):
             )
         return StepRecord(
             t=t,
-            begins_anew=begins_anew,
+            is_reset=is_reset,
             track_id=ids,
             scans=scans,
             real=real,

@@ -30,8 +30,8 @@ class StepInput(NamedTuple):
         numbers: (K,) of boxes of each.
         boxes: (M, 4) left, top, width, height (px), sensor by sensor.
         scores: (M,) of them.
-        alike: (N, M) how much more likely each box is of a living track than of another by what both look
-            like, as ln of the ratio; None where nothing is known.
+        similarity: (N, M) how much more likely each box is of a living track than of another by their
+            appearance, as ln of the ratio; None where nothing is known.
         motion: (11,) of the camera since its picture before, as `PictureMotion` has it; or None.
         owners: (M, 3) where who is who is given: whose each box is, below 0 for nobody's, at most one box
             of a sensor each; 1 where more of its owner's are to come; posterior of an object there by what
@@ -44,13 +44,13 @@ class StepInput(NamedTuple):
     numbers: IntArray
     boxes: FloatArray
     scores: FloatArray
-    alike: FloatArray | None = None
+    similarity: FloatArray | None = None
     motion: FloatArray | None = None
     owners: FloatArray | None = None
 
 
 class StepBoxes(NamedTuple):
-    """The boxes of the last step, in the order of `TrackEngine.takers`.
+    """The boxes of the last step, in the order of `TrackEngine.assigned`.
 
     Attributes:
         t: its time (s).
@@ -105,24 +105,24 @@ class TrackEngine(Protocol):
         """Whether `hypotheses` has."""
 
     @property
-    def compares_looks(self) -> bool:
+    def compares_appearance(self) -> bool:
         """Whether it takes what boxes look like."""
 
     @property
     def takes_owners(self) -> bool:
         """Whether it can be given who is who."""
 
-    def declare_sensor(self, name: str, said: SensorConfig) -> None:
-        """Add a sensor that has not looked yet, with what the user says of it."""
+    def declare_sensor(self, name: str, declared: SensorConfig) -> None:
+        """Add a sensor that has had no scan yet, with what the user says of it."""
 
-    def take(self, looked: StepInput) -> None:
+    def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time, which is not before that of the last step.
 
         Raises:
             JeatGraphError: owners are given to an engine that takes none.
         """
 
-    def begin_anew(self, t: float) -> None:
+    def reset(self, t: float) -> None:
         """End all tracks and go on from another time (s), as if none had passed; what was learnt stays."""
 
     def number_on_from(self, identity: int) -> None:
@@ -153,7 +153,7 @@ class TrackEngine(Protocol):
     def living(self) -> IntArray:
         """Return the identities (N,) of the tracks of the last step, before any ended."""
 
-    def takers(self) -> IntArray:
+    def assigned(self) -> IntArray:
         """Return the identity of the track (M,) that took each box of the last step, 0 where none did."""
 
     def rows(self) -> ModelRows:
@@ -162,8 +162,8 @@ class TrackEngine(Protocol):
     def predicted(self, t: float) -> tuple[ModelRows, FloatArray]:
         """Return these tracks at a later time (s), and the covariances (N, 2, 5, 5) of what is told."""
 
-    def last_looks(self) -> FloatArray:
-        """Return when each sensor (S,) looked last (s), NaN for never."""
+    def last_scans(self) -> FloatArray:
+        """Return the time of each sensor's (S,) last scan (s), NaN before it."""
 
     def picture(self) -> tuple[float, float] | None:
         """Return width and height of the picture (px), as far as is known; None where it does not matter."""
@@ -185,7 +185,7 @@ class TrackEngine(Protocol):
             JeatGraphError: the engine does not say it.
         """
 
-    def measurements(self, told: StepBoxes) -> RecordArray:
+    def measurements(self, measured: StepBoxes) -> RecordArray:
         """Return the boxes of the last step as `MEASUREMENT` (M,), as the filter weighed them.
 
         Raises:

@@ -109,9 +109,9 @@ class InputWatch:
         self._newest: dict[str, float] = {}
         self._said: set[str] = set()
         self._ended = False
-        self._looked_for_corners = False
+        self._corners_checked = False
 
-    def look(self, batch: Sequence[Scan]) -> None:
+    def check(self, batch: Sequence[Scan]) -> None:
         """Take notice of the scans of one time; those that come again after a late one count once."""
         if self._ended:
             return
@@ -127,8 +127,8 @@ class InputWatch:
             if self._count < LAST_BOXES and len(scan.boxes):
                 self._boxes.append(np.array(scan.boxes))
                 self._count += len(scan.boxes)
-        if not self._looked_for_corners and self._count >= CORNER_BOXES:
-            self._looked_for_corners = True
+        if not self._corners_checked and self._count >= CORNER_BOXES:
+            self._corners_checked = True
             first = np.concatenate(self._boxes)
             if only_corners(first, self._config.image.width, self._config.image.height):
                 self._say("corners", CORNERS)
@@ -183,5 +183,5 @@ class InputWatch:
     def _say(self, kind: str, text: str) -> None:
         if kind not in self._said:
             self._said.add(kind)
-            # Up from here: a judgement, `look`, the tracker's `take_in`, `step`, its lock, and its caller.
+            # Up from here: a judgement, `check`, the tracker's `take_in`, `step`, its lock, and its caller.
             warnings.warn(text, InputWarning, stacklevel=7)

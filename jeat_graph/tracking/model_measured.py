@@ -19,8 +19,8 @@ _NO_ERROR = -1
 
 
 def diagnostics_of(
-    told: StepBoxes,
-    takers: IntArray,
+    measured: StepBoxes,
+    assigned: IntArray,
     living: IntArray,
     fit: tuple[FloatArray, FloatArray, FloatArray],
     sensors: tuple[str, ...],
@@ -28,28 +28,28 @@ def diagnostics_of(
     """Return how well each box of a step fitted its track.
 
     Args:
-        told: the boxes.
-        takers: (M,) tracks that took them.
+        measured: the boxes.
+        assigned: (M,) tracks that took them.
         living: (N,) tracks after the step, ascending.
         fit: of `TrackEngine.fit`.
         sensors: names of the sensors.
     """
     nis, scale, real = fit
-    row, there = places(takers, living)
+    row, there = places(assigned, living)
     return Diagnostics(
-        t=np.full(len(takers), told.t),
-        track_id=takers,
-        sensor=told.sensor,
+        t=np.full(len(assigned), measured.t),
+        track_id=assigned,
+        sensor=measured.sensor,
         nis=nis,
         noise_scale=scale,
-        existence=np.where(there, real[row], np.nan) if len(living) else np.full(len(takers), np.nan),
+        existence=np.where(there, real[row], np.nan) if len(living) else np.full(len(assigned), np.nan),
         sensors=sensors,
     )
 
 
 def records_of(
-    told: StepBoxes,
-    takers: IntArray,
+    measured: StepBoxes,
+    assigned: IntArray,
     fit: tuple[FloatArray, FloatArray, FloatArray],
     q: singer.ProcessNoise,
     c: ModelConstants,
@@ -57,22 +57,22 @@ def records_of(
     """Return the boxes of a step as `MEASUREMENT` (M,), as the filter weighed them.
 
     Args:
-        told: the boxes; sensors as the caller counts them.
-        takers: (M,) tracks that took them.
+        measured: the boxes; sensors as the caller counts them.
+        assigned: (M,) tracks that took them.
         fit: of `TrackEngine.fit`.
         q: process noise of the scene.
         c: constants.
     """
     nis, scale, _ = fit
-    rows = np.zeros(len(takers), dtype=MEASUREMENT)
-    size = told.boxes[:, 2:]
+    rows = np.zeros(len(assigned), dtype=MEASUREMENT)
+    size = measured.boxes[:, 2:]
     # What is in proportion to ρ² is the sensor's own, and of that a part lasts (`singer.lasting_error`).
     of_size = box_sides.side_variance(size, 0.0, c) - c.pixel_std**2
     own = (c.side_std**2 * scale)[:, None] * of_size
     side, lasting = own + c.pixel_std**2, c.error_share * own
     whole, born = np.sqrt(size.prod(axis=1)), np.isnan(nis)
-    rows["t"], rows["track_id"], rows["sensor"], rows["birth"] = told.t, takers, told.sensor, born
-    rows["z"] = told.boxes[:, :2] + size / 2.0
+    rows["t"], rows["track_id"], rows["sensor"], rows["birth"] = measured.t, assigned, measured.sensor, born
+    rows["z"] = measured.boxes[:, :2] + size / 2.0
     # The centre is the mean of two sides, the size their difference.
     rows["r"] = rows["noise"] = side / 2.0
     rows["coloured_std"] = np.sqrt(lasting / 2.0)
@@ -81,7 +81,7 @@ def records_of(
     rows["size_density"] = math.exp(q.growth / 2.0)
     rows["log_size"], rows["size_var"] = np.log(size), 2.0 * (side + lasting) / size**2
     if born.any():
-        corners = np.concatenate([told.boxes[:, :2], told.boxes[:, :2] + size], axis=1)
+        corners = np.concatenate([measured.boxes[:, :2], measured.boxes[:, :2] + size], axis=1)
         whole = np.zeros((int(born.sum()), 2, 2), dtype=np.bool_)
         _, first = box_sides.initial_state(corners[born], whole, 0.0, 0.0, c)
         rows["velocity_var"][born] = first[:, :, singer.VELOCITY, singer.VELOCITY]

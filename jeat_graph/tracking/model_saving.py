@@ -14,7 +14,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.errors import DataError
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.tracking.appearance import Looks
+from jeat_graph.tracking.appearance import Appearances
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.engine import Moment, StepBoxes, TrackEngine
@@ -28,9 +28,9 @@ class ModelSnapshot(NamedTuple):
 
     Attributes:
         moment: the engine's.
-        sensors: names of those that had looked.
+        sensors: names of those that had had a scan.
         classes: votes on the tracks' classes, or None.
-        looks: what the tracks look like, or None.
+        appearance: what the tracks look like, or None.
         order: (K,) places of the last step's boxes, as the model has them, among those given.
         given: how many these were.
         boxes: of the last step, for diagnostics.
@@ -39,7 +39,7 @@ class ModelSnapshot(NamedTuple):
     moment: Moment
     sensors: tuple[str, ...]
     classes: ClassTally | None
-    looks: Looks | None
+    appearance: Appearances | None
     order: IntArray
     given: int
     boxes: StepBoxes
@@ -115,7 +115,7 @@ class SavedModel:
             "model": dict(self._model.state(now.moment)),
             "sensors": list(now.sensors),
             "classes": now.classes,
-            "looks": now.looks,
+            "appearance": now.appearance,
             "order": now.order,
             "given": now.given,
             "boxes": now.boxes,
@@ -140,17 +140,19 @@ class SavedModel:
         except ValueError as error:
             raise DataError(f"is damaged: {error}") from None
         sensors, called = tuple(state["sensors"]), list(state["called"])
-        if len(set(sensors)) != len(model.last_looks()) or not set(sensors) <= set(config.sensors):
+        if len(set(sensors)) != len(model.last_scans()) or not set(sensors) <= set(config.sensors):
             raise DataError("is damaged: its sensors are not those of its state")
         if not all(isinstance(name, str) for name in called):
             raise DataError("is damaged: names of classes are none")
         order, given, boxes = state["order"], state["given"], state["boxes"]
-        _check_order(order, given, len(model.takers()))
+        _check_order(order, given, len(model.assigned()))
         _check_boxes(boxes, len(order) if state["diagnostics"] else 0, len(sensors))
         _check_tally(state["classes"], called)
-        _check_looks(state["looks"], len(sensors))
+        _check_appearance(state["appearance"], len(sensors))
         moment = model.snapshot()
-        tracker.restore(ModelSnapshot(moment, sensors, state["classes"], state["looks"], order, given, boxes))
+        tracker.restore(
+            ModelSnapshot(moment, sensors, state["classes"], state["appearance"], order, given, boxes)
+        )
         tracker._finished, tracker._called = bool(state["finished"]), called
         if (tracker._log is None) != (state["log"] is None):
             raise DataError("is damaged: detections of the recording are missing")
@@ -212,15 +214,19 @@ def _check_tally(tally: Any, called: list[str]) -> None:
         raise DataError("is damaged: the votes on classes are none")
 
 
-def _check_looks(looks: Any, sensors: int) -> None:
-    if looks is None:
+def _check_appearance(appearance: Any, sensors: int) -> None:
+    if appearance is None:
         return
-    good = isinstance(looks, Looks) and _ascending(looks.track_id) and isinstance(looks.mean, np.ndarray)
-    good = good and isinstance(looks.moments, np.ndarray) and len(looks.moments) <= sensors
-    shape = (len(looks.track_id), len(looks.moments), *looks.mean.shape[2:]) if good else ()
-    good = good and len(shape) == 3 and _is_array(looks.mean, np.float64, shape)
-    good = good and _is_array(looks.moments, np.float64, (len(looks.moments), 2, 3))
-    if not good or not np.isfinite(looks.mean).all() or not np.isfinite(looks.moments).all():
+    good = (
+        isinstance(appearance, Appearances)
+        and _ascending(appearance.track_id)
+        and isinstance(appearance.mean, np.ndarray)
+    )
+    good = good and isinstance(appearance.moments, np.ndarray) and len(appearance.moments) <= sensors
+    shape = (len(appearance.track_id), len(appearance.moments), *appearance.mean.shape[2:]) if good else ()
+    good = good and len(shape) == 3 and _is_array(appearance.mean, np.float64, shape)
+    good = good and _is_array(appearance.moments, np.float64, (len(appearance.moments), 2, 3))
+    if not good or not np.isfinite(appearance.mean).all() or not np.isfinite(appearance.moments).all():
         raise DataError("is damaged: what tracks look like is nothing of the kind")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +24,7 @@ from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import ModelRows, in_order
-from jeat_graph.tracking.appearance import Compared, Looks, compare, embeddings_of, remember
+from jeat_graph.tracking.appearance import Appearances, Compared, compare, embeddings_of, remember
 from jeat_graph.tracking.classes import ClassTally, Votes, check_names, number_classes
 from jeat_graph.tracking.engine import StepBoxes, StepInput, TrackEngine
 from jeat_graph.tracking.engines import make_engine
@@ -48,20 +49,20 @@ from jeat_graph.tracking.updates import Updates
 
 #: Most sensors: the columns of `Trajectories.used` are the bits of a signed number.
 _MOST_SENSORS = 63
-#: Greatest absolute value of ln of what looks say of a pair.
-_MOST_ALIKE = 4.0
+#: Greatest absolute value of ln of the similarity of a pair.
+_MOST_SIMILARITY = 4.0
 _NO_BOXES: IntArray = np.zeros(0, dtype=np.int64)
 _FINISHED = "this tracker has been finished; make another one for another recording"
 
 
 def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
     """Return the camera's motion (11,) of the scan that knows it best; None if none does."""
-    told = [scan.camera_motion for scan in batch if scan.camera_motion is not None]
-    return min(told, key=lambda one: float(one[7] + one[8])) if told else None
+    measured = [scan.camera_motion for scan in batch if scan.camera_motion is not None]
+    return min(measured, key=lambda one: float(one[7] + one[8])) if measured else None
 
 
 @one_at_a_time(
-    "step take_in hand_over snapshot restore begin_anew number_on_from takers living last_looks meet causal "
+    "step take_in hand_over snapshot restore reset number_on_from assigned living last_scans meet causal "
     "rows_below_least predict last_updates last_measurements smoothed drain_smoothed settle finish "
     "finish_in_pieces follow disagreements identity_links state hypotheses learnt sensor_states"
 )
@@ -105,9 +106,9 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
         self.config = config
         self.constants = constants or ModelConstants()
         self.sensor_names: tuple[str, ...] = config.sensor_names
-        self._looked: tuple[str, ...] = ()  # names of the sensors as the engine counts them
+        self._engine_sensors: tuple[str, ...] = ()  # names of the sensors as the engine counts them
         self._places = Places(())  # where these stand among all
-        self.logs_takers = True
+        self.logs_assigned = True
         self._diagnostics = diagnostics
         wanted, whole = config.smoother.engine != "none", config.smoother.identities == "whole"
         self._smooths = wanted and not whole
@@ -122,7 +123,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
         self._classes: ClassTally | None = None
         self._class_ids: dict[str, int] = {}
         self._called: list[str] = []  # names of classes by number
-        self._looks: Looks | None = None
+        self._appearance: Appearances | None = None
         self._causal: Trajectories | None = None
         # Of the last step: places of the boxes in the model's order, and how many were given.
         self._order, self._given = _NO_BOXES, 0
@@ -130,7 +131,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
         self._instants = SmoothedInstants(config)
         self._finished = False
 
-    def anew(self, *, smooths: bool = True, constants: ModelConstants | None = None) -> ModelTracker:
+    def fresh_copy(self, *, smooths: bool = True, constants: ModelConstants | None = None) -> ModelTracker:
         """Return a new tracker of this configuration, with causal identities, that warns of no input again.
 
         Args:
@@ -179,7 +180,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
         Args:
             scans: a `Scan`, or a tuple of time (s), name of the sensor, boxes (M, 4) left, top, width, height
                 (px) and scores (M,), perhaps with classes (M,); or a list of these. No boxes (M = 0) say that
-                the sensor looked and found nothing.
+                the scan found nothing.
 
         Returns:
             The reported tracks at that time, no earlier rows: `Trajectories.concatenate` joins those of all
@@ -230,25 +231,27 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
             raise TimeOrderError(f"scan at t = {t} s is older than the last one at {now} s")
         check_names(self._classes, batch)
         seen = any(scan.embeddings is not None for scan in batch)
-        if seen and not self._model.compares_looks:
+        if seen and not self._model.compares_appearance:
             raise DataError("this engine compares no embeddings; leave them or the engine away")
-        embeddings = embeddings_of(self._looks, batch) if seen else None
-        self._watch.look(batch)  # before anything changes: a user may have made warnings errors
+        embeddings = embeddings_of(self._appearance, batch) if seen else None
+        self._watch.check(batch)  # before anything changes: a user may have made warnings errors
         kept = self._heaps.kept(batch)
         self._declare(batch)
         # Several scans of one sensor at one time are one.
-        codes = [self._looked.index(scan.sensor) for scan in batch]
+        codes = [self._engine_sensors.index(scan.sensor) for scan in batch]
         sensor = np.repeat(codes, [len(scan) for scan in batch]).astype(np.int64)
         order = np.argsort(sensor, kind="stable")
         order = order if kept is None else order[kept[order]]  # those that count
-        looking = np.array(sorted(set(codes)), dtype=np.int64)
+        scanning = np.array(sorted(set(codes)), dtype=np.int64)
         boxes = np.concatenate([scan.boxes for scan in batch])[order]
         scores = np.concatenate([scan.scores for scan in batch])[order]
-        numbers = np.bincount(sensor[order], minlength=len(self._looked))[looking].astype(np.int64)
+        numbers = np.bincount(sensor[order], minlength=len(self._engine_sensors))[scanning].astype(np.int64)
         compared = None if embeddings is None else self._compare(embeddings, sensor)
-        alike = None if compared is None else compared.log_ratio[:, order]
+        similarity = None if compared is None else compared.log_ratio[:, order]
         given = None if owners is None else owners[order]
-        self._model.take(StepInput(t, looking, numbers, boxes, scores, alike, _surest_motion(batch), given))
+        self._model.take(
+            StepInput(t, scanning, numbers, boxes, scores, similarity, _surest_motion(batch), given)
+        )
         self._order, self._given, self._causal = order, len(sensor), None
         if self._log is not None:
             self._log.add(batch, took(self, len(sensor)), kept)
@@ -257,7 +260,9 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
         self._count_classes(batch)
         if compared is not None:
             detection = np.arange(len(sensor), dtype=np.int64)
-            self._looks = remember(compared, self.takers(len(sensor)), detection, self._model.identities())
+            self._appearance = remember(
+                compared, self.assigned(len(sensor)), detection, self._model.identities()
+            )
 
     def hand_over(self, taken: PendingStep | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
@@ -268,49 +273,67 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
     def snapshot(self) -> ModelSnapshot:
         """Copy all that the next step depends on; the smoothers are not part of it."""
         return ModelSnapshot(
-            *(self._model.snapshot(), self._looked, self._classes, self._looks),
+            *(self._model.snapshot(), self._engine_sensors, self._classes, self._appearance),
             *(self._order, self._given, self._boxes),
         )
 
     def restore(self, snapshot: ModelSnapshot) -> None:
         """Go back to a snapshot of this tracker."""
-        moment, self._looked, self._classes, self._looks, self._order, self._given, self._boxes = snapshot
+        (
+            moment,
+            self._engine_sensors,
+            self._classes,
+            self._appearance,
+            self._order,
+            self._given,
+            self._boxes,
+        ) = snapshot
         self._model.restore(moment)
         self._find_places()
         self._causal = None
 
-    def begin_anew(self, t: float) -> None:
+    def reset(self, t: float) -> None:
         """End all tracks and let time go on from another moment, an earlier one too (s).
 
         Identities go on, and so does what was learnt of the scene: it is as if no time had passed.
         """
         if self.time is not None:
-            self._model.begin_anew(t)
+            self._model.reset(t)
             # The model has no last step now, so there are no boxes of one either.
             self._order, self._given = _NO_BOXES, 0
             self._boxes, self._causal = StepBoxes.none(), None
-            self._instants.begin_anew()
+            self._instants.reset()
 
     def number_on_from(self, identity: int) -> None:
         """Give no track that begins from now on an identity below this."""
         self._model.number_on_from(identity)
 
+    def begin_anew(self, t: float) -> None:
+        """Old name of `reset`."""
+        warnings.warn("begin_anew is now called reset", DeprecationWarning, stacklevel=2)
+        self.reset(t)
+
     def takers(self, count: int) -> IntArray:
+        """Old name of `assigned`."""
+        warnings.warn("takers is now called assigned", DeprecationWarning, stacklevel=2)
+        return self.assigned(count)
+
+    def assigned(self, count: int) -> IntArray:
         """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
         out = np.zeros(count, dtype=np.int64)
         if count == self._given:
-            out[self._order] = self._model.takers()
+            out[self._order] = self._model.assigned()
         return out
 
     def living(self) -> tuple[IntArray, int]:
         """Return the identities (N,) of the living tracks, and that of the next one to be born."""
         return self._model.identities(), self._model.born() + 1
 
-    def last_looks(self) -> dict[str, float]:
-        """Return when each declared sensor looked last (s), minus infinity for never."""
-        looks = np.nan_to_num(self._model.last_looks(), nan=-math.inf, neginf=-math.inf)
+    def last_scans(self) -> dict[str, float]:
+        """Return the time of each declared sensor's last scan (s), minus infinity before it."""
+        times = np.nan_to_num(self._model.last_scans(), nan=-math.inf, neginf=-math.inf)
         never = dict.fromkeys(self.sensor_names, -math.inf)
-        return never | dict(zip(self._looked, looks.tolist(), strict=True))
+        return never | dict(zip(self._engine_sensors, times.tolist(), strict=True))
 
     def meet(self, scans: Sequence[Scan]) -> None:
         """Have the configuration declare the sensors of some scans, if it lets it.
@@ -368,8 +391,8 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
         """
         self._check_diagnostics()
         model = self._model
-        told = self._boxes._replace(sensor=self._places.at[self._boxes.sensor])
-        return diagnostics_of(told, model.takers(), model.living(), model.fit(), self.sensor_names)
+        measured = self._boxes._replace(sensor=self._places.at[self._boxes.sensor])
+        return diagnostics_of(measured, model.assigned(), model.living(), model.fit(), self.sensor_names)
 
     def last_measurements(self) -> tuple[RecordArray, IntArray, BoolArray]:
         """Return what the last step gave to the tracks, for other smoothers.
@@ -381,9 +404,9 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
             JeatGraphError: the tracker was not made with `diagnostics`.
         """
         self._check_diagnostics()
-        told = self._boxes._replace(sensor=self._places.at[self._boxes.sensor])
+        measured = self._boxes._replace(sensor=self._places.at[self._boxes.sensor])
         real = self._model.fit()[2]
-        return self._model.measurements(told), self._model.living(), real > self.constants.report
+        return self._model.measurements(measured), self._model.living(), real > self.constants.report
 
     def run(self, detections: Detections) -> Iterator[Trajectories]:
         """Step through a recording and yield the table of each time; scans of one time are taken jointly."""
@@ -397,48 +420,52 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
             JeatGraphError: the engine weighs none.
         """
         t = 0.0 if self.time is None else self.time
-        return self._model.hypotheses(t, self.causal().track_id, self._looked)
+        return self._model.hypotheses(t, self.causal().track_id, self._engine_sensors)
 
     def learnt(self) -> dict[str, SensorState]:
-        """Return what has been learnt of each sensor that has looked, by name; as `sensor_states`."""
+        """Return what has been learnt of each sensor that has had a scan, by name; as `sensor_states`."""
         return self.sensor_states()
 
     def sensor_states(self) -> dict[str, SensorState]:
-        """Return what has been learnt of each sensor that has looked, by name."""
-        return dict(zip(self._looked, self._model.sensor_states(), strict=True))
+        """Return what has been learnt of each sensor that has had a scan, by name."""
+        return dict(zip(self._engine_sensors, self._model.sensor_states(), strict=True))
 
     def step_record(self, taken: PendingStep) -> StepRecord:
         """Return how the filter went through a step that `take_in` returned, as every engine has it.
 
-        Sensors are counted as they have looked (`looked`).
+        Sensors are counted in the order of their first scans (`engine_sensors`).
         """
         return self._model.step_record(taken.record)
 
     @property
-    def looked(self) -> tuple[str, ...]:
-        """Names of the sensors that have looked, in the order in which the engine counts them."""
-        return self._looked
+    def engine_sensors(self) -> tuple[str, ...]:
+        """Names of the sensors that have had a scan, in the order in which the engine counts them."""
+        return self._engine_sensors
 
     def _check_diagnostics(self) -> None:
         if not self._diagnostics:
             raise JeatGraphError("make the tracker with diagnostics=True to be told of its updates")
 
     def _declare(self, batch: Sequence[Scan]) -> None:
-        """Make the sensors known that look for the first time."""
-        new = sorted({scan.sensor for scan in batch if scan.sensor not in self._looked})
-        if len(self._looked) + len(new) > _MOST_SENSORS:
+        """Make the sensors of first scans known."""
+        new = sorted({scan.sensor for scan in batch if scan.sensor not in self._engine_sensors})
+        if len(self._engine_sensors) + len(new) > _MOST_SENSORS:
             raise DataError(f"at most {_MOST_SENSORS} sensors can be tracked together")
         for name in new:
             self._model.declare_sensor(name, self.config.sensors[name])
-            self._looked = (*self._looked, name)
+            self._engine_sensors = (*self._engine_sensors, name)
         if new:
             self._find_places()
 
     def _compare(self, embeddings: EmbeddingArray, sensor: IntArray) -> Compared:
         """Compare the embeddings (M, E) of a step's detections with the living tracks."""
-        looks, number = self._looks, len(self._looked)
-        looks = looks.among(number) if looks is not None else Looks.start(number, embeddings.shape[1])
-        return compare(looks.of(self._model.identities()), embeddings, sensor, _MOST_ALIKE)
+        appearance, number = self._appearance, len(self._engine_sensors)
+        appearance = (
+            appearance.among(number)
+            if appearance is not None
+            else Appearances.start(number, embeddings.shape[1])
+        )
+        return compare(appearance.of(self._model.identities()), embeddings, sensor, _MOST_SIMILARITY)
 
     def _count_classes(self, batch: Sequence[Scan]) -> None:
         """Let the boxes of a step vote for the classes of their tracks."""
@@ -447,7 +474,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
         self._class_ids = number_classes(self._class_ids, batch)
         votes = Votes.of_batch(batch, np.arange(self._given, dtype=np.int64))
         tally = self._classes or ClassTally.start()
-        self._classes = tally.after(self._model.living(), self.takers(self._given), votes)
+        self._classes = tally.after(self._model.living(), self.assigned(self._given), votes)
         self._called += [name for name in self._classes.names.tolist() if name not in self._called]
 
     def _called_now(self) -> tuple[IntArray | None, FloatArray | None]:
@@ -474,4 +501,4 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
 
     def _find_places(self) -> None:
         """Find out where the model's sensors stand among all."""
-        self._places = Places([self.sensor_names.index(name) for name in self._looked])
+        self._places = Places([self.sensor_names.index(name) for name in self._engine_sensors])

@@ -53,14 +53,14 @@ class Learnt(NamedTuple):
     process_noise: singer.ProcessNoise
 
 
-def told_of(c: ModelConstants) -> RowOutput:
-    """Return how tables tell the states of the model."""
-    return RowOutput(partial(singer.told_motion, c=c), partial(singer.told_covariance, c=c))
+def row_output(c: ModelConstants) -> RowOutput:
+    """Return how tables report the states of the model."""
+    return RowOutput(partial(singer.reported_motion, c=c), partial(singer.reported_covariance, c=c))
 
 
-def even_logit_of(said: SensorConfig) -> float:
+def even_logit_of(declared: SensorConfig) -> float:
     """Return the logit of the score at which a box is as likely real as not; NaN where it is to be learnt."""
-    return math.nan if said.even_score is None else float(logit(np.array(said.even_score)))
+    return math.nan if declared.even_score is None else float(logit(np.array(declared.even_score)))
 
 
 class OneModel(SmoothsRecords):
@@ -75,12 +75,12 @@ class OneModel(SmoothsRecords):
     #: What an engine of the model has; see `TrackEngine`.
     has_fit = True
     weighs = True
-    compares_looks = True
+    compares_appearance = True
     takes_owners = True
 
     def __init__(self, constants: ModelConstants, config: Config, by_records: bool = True) -> None:
-        told, existence = told_of(constants), Existence(constants)
-        super().__init__(histories_of(config, existence, told) if by_records else None)
+        output, existence = row_output(constants), Existence(constants)
+        super().__init__(histories_of(config, existence, output) if by_records else None)
         self.constants = constants
 
     @abstractmethod
@@ -100,7 +100,7 @@ class OneModel(SmoothsRecords):
         """Return their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7."""
 
     @abstractmethod
-    def takers(self) -> IntArray:
+    def assigned(self) -> IntArray:
         """Return the identity of the track (M,) that took each box of the last step."""
 
     @abstractmethod
@@ -133,9 +133,9 @@ class OneModel(SmoothsRecords):
             for k in range(len(noise))
         ]
 
-    def measurements(self, told: StepBoxes) -> RecordArray:
+    def measurements(self, measured: StepBoxes) -> RecordArray:
         """Return the boxes of the last step as the filter weighed them; see `TrackEngine.measurements`."""
-        return records_of(told, self.takers(), self.fit(), self.learnt().process_noise, self.constants)
+        return records_of(measured, self.assigned(), self.fit(), self.learnt().process_noise, self.constants)
 
     def hypotheses(self, t: float, shown: IntArray, sensors: tuple[str, ...]) -> Hypotheses:
         """Return what the living tracks are taken for, and why; see `TrackEngine.hypotheses`."""

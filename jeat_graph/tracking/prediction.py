@@ -63,7 +63,8 @@ def predicted(
         c: constants.
 
     Returns:
-        The rows then, which no sensor has seen, and the covariances (N, 2, 5, 5) of `singer.told_covariance`.
+        The rows then, which no sensor has seen, and the covariances (N, 2, 5, 5) of
+        `singer.reported_covariance`.
     """
     shape = (len(rows[0]), 2, singer.STATES)
     mean, covariance = states[0].reshape(shape), states[1].reshape(*shape, singer.STATES)
@@ -72,9 +73,9 @@ def predicted(
         model = singer.discretise(dt, c)
         F = singer.in_perspective(model.F, mean, dt, c)
         mean, covariance = singer.predict(mean, covariance, model, F, *noise, c)
-    motion = singer.told_covariance(mean, covariance, c)
+    motion = singer.reported_covariance(mean, covariance, c)
     variance = np.diagonal(motion, axis1=2, axis2=3).reshape(-1, 2 * singer.MOTION)
-    flat = singer.told_motion(mean, c).reshape(-1, 2 * singer.MOTION)
+    flat = singer.reported_motion(mean, c).reshape(-1, 2 * singer.MOTION)
     _, ids, _, _, real, used, label, share = rows
     return (np.full(len(mean), t), ids, flat, variance, real, 0 * used, label, share), motion
 

@@ -28,10 +28,10 @@ def unsmoothed(config: Config) -> Config:
     return replace(config, smoother=replace(config.smoother, engine="none"))
 
 
-def histories_of(config: Config, existence: Existence, told: RowOutput) -> Histories | None:
+def histories_of(config: Config, existence: Existence, output: RowOutput) -> Histories | None:
     """Return what smooths as a configuration asks for; None where it wants no smoother."""
     lag_s = lag_of(config)
-    return None if lag_s < 0.0 else Histories(lag_s, existence, told, _solver_of(config))
+    return None if lag_s < 0.0 else Histories(lag_s, existence, output, _solver_of(config))
 
 
 def by_gtsam(config: Config) -> bool:
@@ -75,12 +75,12 @@ class SmoothsRecords(ABC):
         """Tell the smoother of a step; see `TrackEngine.hand_over`."""
         if self._histories is None:
             return
-        told = self.step_record(self.record() if record is None else record)
-        ids = told.track_id.tolist()
+        step = self.step_record(self.record() if record is None else record)
+        ids = step.track_id.tolist()
         names = ids if given is None else given.tolist()
         labels = [-1] * len(ids) if label is None else label.tolist()
         shares = [0.0] * len(ids) if share is None else share.tolist()
-        self._histories.take(told, [Called(*one) for one in zip(names, labels, shares, strict=True)])
+        self._histories.take(step, [Called(*one) for one in zip(names, labels, shares, strict=True)])
 
     def smoothed(self) -> ModelRows:
         """Return the smoothed rows so far, without what was drained."""

@@ -47,23 +47,25 @@ def record_tracks(
         times += [taken.t] * len(scans)
     causal = Trajectories.concatenate(tables)
     # Sensors are numbered as in the configuration, in the order of their names.
-    number = np.array([*(tracker.sensor_names.index(name) for name in tracker.looked), -1], dtype=np.int64)
+    number = np.array(
+        [*(tracker.sensor_names.index(name) for name in tracker.engine_sensors), -1], dtype=np.int64
+    )
     reported = set(causal.track_id.tolist())
     whole = [one for one in tracks_of(records, times) if one.track_id in reported]
     output = None
     if tracker.config.tracker.engine != "paper":
         c = tracker.constants
-        output = Output(partial(_told, c=c), partial(_told_covariance, c=c))
+        output = Output(partial(_reported, c=c), partial(_reported_covariance, c=c))
     return [replace(one, sensor=number[one.sensor], output=output) for one in whole], causal
 
 
-def _told(mean: FloatArray, c: ModelConstants) -> FloatArray:
+def _reported(mean: FloatArray, c: ModelConstants) -> FloatArray:
     """Return place, velocity and acceleration (..., 2, 3) of states (..., 2, 7) as tables tell them."""
-    return singer.told_motion(mean, c)[..., _MOTION]
+    return singer.reported_motion(mean, c)[..., _MOTION]
 
 
-def _told_covariance(mean: FloatArray, covariance: FloatArray, c: ModelConstants) -> FloatArray:
-    return singer.told_covariance(mean, covariance, c)[..., _MOTION, :][..., _MOTION]
+def _reported_covariance(mean: FloatArray, covariance: FloatArray, c: ModelConstants) -> FloatArray:
+    return singer.reported_covariance(mean, covariance, c)[..., _MOTION, :][..., _MOTION]
 
 
 def record_measurements(

@@ -87,7 +87,7 @@ class Reported(NamedTuple):
     Attributes:
         tracks: (N,) the tracks after it, before any ends.
         reported: (N,) which are reported.
-        takers: per scan (M,) identity of the track that took each box; every box has one.
+        assigned: per scan (M,) identity of the track that took each box; every box has one.
         records: per scan, for the smoother.
         nis: per scan (M,) of `AssociatedPairs`, NaN where a box began a track.
         noise_scale: per scan, variance of the sensor's sides as it was, 1 before anything was learnt.
@@ -96,7 +96,7 @@ class Reported(NamedTuple):
 
     tracks: ReferenceTracks
     reported: BoolArray
-    takers: list[IntArray]
+    assigned: list[IntArray]
     records: list[FilterRecord]
     nis: list[FloatArray]
     noise_scale: list[float]
@@ -121,11 +121,11 @@ def step(
     """
     step_s = t if state.t is None else state.t
     state.tracks = replace(state.tracks, used=np.zeros_like(state.tracks.used))
-    takers, records = [np.zeros(0, dtype=np.int64) for _ in scans], []
+    assigned, records = [np.zeros(0, dtype=np.int64) for _ in scans], []
     nis, noise_scale = [np.full(len(scan.boxes), np.nan) for scan in scans], [1.0 for _ in scans]
     for place in order_of_scans(state, scans):
         given = scans[place]
-        clock = look(state, t, given, c)
+        clock = begin_scan(state, t, given, c)
         dt = 0.0 if state.t is None else t - state.t
         transition = predict(state, t, c)
         scan = correct_boxes(state, given, c)
@@ -141,17 +141,17 @@ def step(
         count_hits_and_misses(state, scan, pairs, clock, c)
         free = count_clutter(state, scan, pairs, c)
         begin_tracks(state, scan, free, clock, c)
-        takers[place] = taker_of(state, pairs, free)
-        compare_sensors(state, given, takers[place], c)
-        took = np.where(np.isin(state.tracks.track_id, takers[place]), given.sensor, -1)
+        assigned[place] = assigned_tracks(state, pairs, free)
+        compare_sensors(state, given, assigned[place], c)
+        took = np.where(np.isin(state.tracks.track_id, assigned[place]), given.sensor, -1)
         records.append(record(before, state.tracks, transition, took))
     compare_overlaps(state)
     judge(state, c)
-    for given, taker in zip(scans, takers, strict=True):
-        count_false_boxes(state, given.sensor, taker, c)
+    for given, by_box in zip(scans, assigned, strict=True):
+        count_false_boxes(state, given.sensor, by_box, c)
     learn(state, t, c)
     shown = report(state, c)
-    out = Reported(state.tracks, shown, takers, records, nis, noise_scale, state.gaps)
+    out = Reported(state.tracks, shown, assigned, records, nis, noise_scale, state.gaps)
     end_tracks(state, t, c)
     return out
 
@@ -162,8 +162,8 @@ def order_of_scans(state: ReferenceState, scans: Sequence[SensorScan]) -> list[i
     return sorted(range(len(scans)), key=content.__getitem__)
 
 
-def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -> ScanClock:
-    """Take notice of a scan: the sensor's period, its indifference point, the picture and its edges."""
+def begin_scan(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -> ScanClock:
+    """Take notice of a scan: the sensor's period, its decision threshold, the picture and its edges."""
     k = scan.sensor
     if not state.picture_known and len(scan.boxes):
         width, height = scan.boxes[:, 2:].max(axis=0)
@@ -171,17 +171,17 @@ def look(state: ReferenceState, t: float, scan: SensorScan, c: ModelConstants) -
     if state.picture_known:
         state.boxes_beyond[k] += box_sides.beyond_edge(scan.boxes, state.picture, c).sum()
         state.boxes_at_edge[k] += box_sides.at_edge(scan.boxes, state.picture, c).any(axis=(1, 2)).sum()
-    since = t - state.last_look_s[k]
+    since = t - state.last_scan_s[k]
     if not math.isnan(since):
         known = not math.isnan(state.period_s[k])
         mean = _PERIOD_MEMORY * state.period_s[k] + (1.0 - _PERIOD_MEMORY) * since
         state.period_s[k] = mean if known else since
-    state.last_look_s[k] = t
+    state.last_scan_s[k] = t
     counts = score_calibration.count_repetition(state.repetition[k], scan.boxes, scan.logits, c)
     state.repetition = (*state.repetition[:k], counts, *state.repetition[k + 1 :])
     even = state.even_logit[k]
-    learnt = score_calibration.indifference(counts, c)
-    state.sensors.indifference[k] = learnt if math.isnan(even) else -even
+    learnt = score_calibration.decision_threshold(counts, c)
+    state.sensors.decision_threshold[k] = learnt if math.isnan(even) else even
     period = c.first_period_s if math.isnan(state.period_s[k]) else float(state.period_s[k])
     return ScanClock(t, period, min(1.0, period / c.correlation_time_s))
 
@@ -273,16 +273,16 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, scan.edges, noise, c)
     size = singer.expected_size(tracks.mean)
     density = likelihood_ratio.sides_log_density(innovation, size, c)
-    score = likelihood_ratio.score_log_ratio(tracks.real, state.sensors.indifference[k] + scan.logits, c)
+    threshold = float(state.sensors.decision_threshold[k])
+    score = likelihood_ratio.score_log_ratio(tracks.real, scan.logits - threshold, c)
     clutter = likelihood_ratio.clutter_log_density(size, float(state.leftovers[k]), state.picture, c)
     present = tracks.presence[:, VISIBLE] * p_detect
     ratio = likelihood_ratio.pair_log_ratio(density, present, score, clutter)
     ratio = by_owner(ratio, tracks.given, scan.owners)
-    track, box = assign(by_looks(ratio, scan.alike), c.exact_assignment)
+    track, box = assign(by_appearance(ratio, scan.similarity), c.exact_assignment)
     seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track, box]
     nis = (seen[0].mean(axis=2) ** 2 / seen[1].mean(axis=(2, 3))).sum(axis=1)
-    indifference = float(state.sensors.indifference[k])
-    by_itself = score_calibration.box_probability(scan.boxes, scan.logits, indifference)
+    by_itself = score_calibration.box_probability(scan.boxes, scan.logits, threshold)
     confirms = by_itself[box] >= c.confirming
     return AssociatedPairs(track, box, ratio[track, box], p_detect, confirms, innovation, nis)
 
@@ -298,13 +298,13 @@ def by_owner(ratio: FloatArray, owner: IntArray, owners: IntArray | None) -> Flo
     return np.where(same, np.maximum(ratio, _LEAST_GAIN), np.where(owned, 0.0, ratio))
 
 
-def by_looks(ratio: FloatArray, alike: FloatArray | None) -> FloatArray:
+def by_appearance(ratio: FloatArray, similarity: FloatArray | None) -> FloatArray:
     """Return ln L (N, M) with what looks say: who takes a box, and not whether there is an object."""
-    if alike is None:
+    if similarity is None:
         return ratio
     out = ratio.copy()
-    known = out[: len(alike)]
-    known[:] = np.where(known > 0.0, np.maximum(known + alike, _LEAST_GAIN), known)
+    known = out[: len(similarity)]
+    known[:] = np.where(known > 0.0, np.maximum(known + similarity, _LEAST_GAIN), known)
     return out
 
 
@@ -352,12 +352,12 @@ def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> 
     because the states before did not know of it.
     """
     tracks, i, seen = state.tracks, pairs.track, pairs.innovation
-    y, S, gone = seen.y[i, pairs.box], seen.S[i, pairs.box], seen.gone[i, pairs.box]
+    y, S, unmeasured = seen.y[i, pairs.box], seen.S[i, pairs.box], seen.unmeasured[i, pairs.box]
     R = box_sides.measured_variance(
-        y, S, seen.side_variance[i], singer.expected_size(tracks.mean[i]), gone, c
+        y, S, seen.side_variance[i], singer.expected_size(tracks.mean[i]), unmeasured, c
     )
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
-    m, P, y = box_sides.uncover(mean[i], covariance[i], y, S, gone, c)
+    m, P, y = box_sides.uncover(mean[i], covariance[i], y, S, unmeasured, c)
     H = box_sides.measurement_matrix(singer.expected_size(m))
     mean[i], covariance[i] = m, P
     before = replace(tracks, mean=mean.copy(), covariance=covariance.copy())
@@ -423,7 +423,7 @@ def count_clutter(
     return free
 
 
-def taker_of(state: ReferenceState, pairs: AssociatedPairs, free: IntArray) -> IntArray:
+def assigned_tracks(state: ReferenceState, pairs: AssociatedPairs, free: IntArray) -> IntArray:
     """Return the identity of the track (M,) that each box of a scan went to; births are the last tracks."""
     ids = state.tracks.track_id
     out = np.zeros(len(pairs.box) + len(free), dtype=np.int64)

@@ -46,17 +46,17 @@ def begin_tracks(
     state.tracks, state.next_id = tracks.append(new), state.next_id + len(free)
 
 
-def compare_sensors(state: ReferenceState, given: SensorScan, taker: IntArray, c: ModelConstants) -> None:
+def compare_sensors(state: ReferenceState, given: SensorScan, assigned: IntArray, c: ModelConstants) -> None:
     """Count what a sensor's boxes differ by from the others' last ones on the same real tracks; keep them."""
     tracks, k = state.tracks, given.sensor
-    row = np.searchsorted(tracks.track_id, taker)
+    row = np.searchsorted(tracks.track_id, assigned)
     for other in range(state.num_sensors):
         age = state.time - tracks.last_box_s[row, other]
         before = tracks.last_box[row, other]
-        told = (before[:, 2] > before[:, 0]) & (age <= c.offset_age_s) & (tracks.real[row] > c.report)
-        if other != k and told.any():
-            moved = tracks.mean[row[told], :, VELOCITY] * age[told, None]
-            d = sensor_offsets.differences(given.boxes[told], before[told], moved)
+        usable = (before[:, 2] > before[:, 0]) & (age <= c.offset_age_s) & (tracks.real[row] > c.report)
+        if other != k and usable.any():
+            moved = tracks.mean[row[usable], :, VELOCITY] * age[usable, None]
+            d = sensor_offsets.differences(given.boxes[usable], before[usable], moved)
             state.offsets = sensor_offsets.count(state.offsets, k, other, d, c)
     last_box, last_box_s = tracks.last_box.copy(), tracks.last_box_s.copy()
     last_box[row, k], last_box_s[row, k] = given.boxes, state.time
@@ -91,9 +91,9 @@ def judge(state: ReferenceState, c: ModelConstants) -> None:
     state.tracks = replace(state.tracks, real=belief.real, log_odds=belief.log_odds, sees=sees)
 
 
-def count_false_boxes(state: ReferenceState, sensor: int, taker: IntArray, c: ModelConstants) -> None:
+def count_false_boxes(state: ReferenceState, sensor: int, assigned: IntArray, c: ModelConstants) -> None:
     """Keep the mean number of a sensor's boxes a scan that are of nothing real, by their takers (M,)."""
-    real = state.tracks.real[np.searchsorted(state.tracks.track_id, taker)]
+    real = state.tracks.real[np.searchsorted(state.tracks.track_id, assigned)]
     mean = c.clutter_memory * state.false_boxes[sensor] + (1.0 - c.clutter_memory) * (1.0 - real).sum()
     state.false_boxes[sensor] = mean
 
@@ -102,8 +102,8 @@ def learn(state: ReferenceState, t: float, c: ModelConstants) -> None:
     """Learn what the sensors are worth from tracks that live and from those that ended."""
     if t - state.learnt_s >= c.learn_period_s:
         state.learnt_s = t
-        told = state.ended.append(state.tracks.evidence)
-        state.sensors = object_probability.learn_sensors(told, state.sensors, c)
+        evidence = state.ended.append(state.tracks.evidence)
+        state.sensors = object_probability.learn_sensors(evidence, state.sensors, c)
 
 
 def report(state: ReferenceState, c: ModelConstants) -> BoolArray:
@@ -140,7 +140,7 @@ def end_tracks(state: ReferenceState, t: float, c: ModelConstants) -> None:
         state.tracks = state.tracks.take(~ends)
 
 
-def begin_anew(state: ReferenceState, t: float, c: ModelConstants) -> None:
+def reset(state: ReferenceState, t: float, c: ModelConstants) -> None:
     """End all tracks and go on from another time (s), as if none had passed; what was learnt stays."""
     ended = state.ended.append(state.tracks.evidence)
     state.ended = ended.take(slice(-c.remembered_tracks, None))
@@ -149,7 +149,7 @@ def begin_anew(state: ReferenceState, t: float, c: ModelConstants) -> None:
         return
     # A sensor has not looked again since: not for less than the time between two of its scans.
     period = np.where(np.isnan(state.period_s), c.first_period_s, state.period_s)
-    state.last_look_s = t - np.clip(state.t - state.last_look_s, period, _LONGEST_AGO_S)
+    state.last_scan_s = t - np.clip(state.t - state.last_scan_s, period, _LONGEST_AGO_S)
     state.learnt_s = t - min(max(state.t - state.learnt_s, 0.0), _LONGEST_AGO_S)
     state.camera_velocity = CameraVelocity.none()
     state.t = None

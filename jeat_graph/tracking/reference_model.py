@@ -20,9 +20,9 @@ from jeat_graph.filters.singer import STATES
 from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import Called, ModelRows, joined, rows_of
 from jeat_graph.tracking.engine import Moment, Recorded, StepInput, lacking
-from jeat_graph.tracking.one_model import Learnt, OneModel, even_logit_of, told_of
+from jeat_graph.tracking.one_model import Learnt, OneModel, even_logit_of, row_output
 from jeat_graph.tracking.reference import step
-from jeat_graph.tracking.reference_life import begin_anew
+from jeat_graph.tracking.reference_life import reset
 from jeat_graph.tracking.reference_state import ReferenceState, SensorScan, declare_sensor, initial_state
 
 #: After so long without any scan all tracks are over (s).
@@ -34,7 +34,7 @@ class Answer(NamedTuple):
 
     rows: ModelRows
     states: tuple[FloatArray, FloatArray]
-    takers: IntArray
+    assigned: IntArray
     living: IntArray
     fit: tuple[FloatArray, FloatArray, FloatArray]
 
@@ -69,55 +69,55 @@ class ReferenceModel(OneModel):
         super().__init__(constants, config)
         size = float(config.image.width), float(config.image.height)
         self._state = initial_state(size if config.input.picture == "given" else None, constants)
-        self._told = told_of(constants)
+        self._output = row_output(constants)
         self._last: StepRecord | None = None
         self._answer = _no_answer()
 
-    def declare_sensor(self, name: str, said: SensorConfig) -> None:
-        """Add a sensor that has not looked yet."""
-        declare_sensor(self._state, self.constants, even_logit_of(said))
+    def declare_sensor(self, name: str, declared: SensorConfig) -> None:
+        """Add a sensor that has had no scan yet."""
+        declare_sensor(self._state, self.constants, even_logit_of(declared))
 
-    def take(self, looked: StepInput) -> None:
+    def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time."""
-        t, alike, motion, owners = looked.t, looked.alike, looked.motion, looked.owners
-        sides = np.concatenate([looked.boxes[:, :2], looked.boxes[:, :2] + looked.boxes[:, 2:]], axis=1)
-        logits, ends = logit(looked.scores), np.cumsum(looked.numbers)
-        begins_anew = self._state.t is not None and t - self._state.t >= _LONGEST_SILENCE_S
-        if begins_anew:
-            begin_anew(self._state, t, self.constants)
-            alike = motion = None
+        t, similarity, motion, owners = inputs.t, inputs.similarity, inputs.motion, inputs.owners
+        sides = np.concatenate([inputs.boxes[:, :2], inputs.boxes[:, :2] + inputs.boxes[:, 2:]], axis=1)
+        logits, ends = logit(inputs.scores), np.cumsum(inputs.numbers)
+        is_reset = self._state.t is not None and t - self._state.t >= _LONGEST_SILENCE_S
+        if is_reset:
+            reset(self._state, t, self.constants)
+            similarity = motion = None
         scans = [
             SensorScan(
                 int(k),
                 sides[end - n : end],
                 logits[end - n : end],
-                None if alike is None else alike[:, end - n : end],
+                None if similarity is None else similarity[:, end - n : end],
                 owners=None if owners is None else owners[end - n : end, 0].astype(np.int64),
                 awaited=None if owners is None else owners[end - n : end, 1] > 0,
             )
-            for k, n, end in zip(looked.sensors, looked.numbers, ends, strict=True)
+            for k, n, end in zip(inputs.sensors, inputs.numbers, ends, strict=True)
         ]
         moved = None if motion is None else PictureMotion.of_numbers(motion)
         done = step(self._state, t, scans, self.constants, moved)
-        told, tracks = done.tracks.take(done.reported), done.tracks
+        reported, tracks = done.tracks.take(done.reported), done.tracks
         scale = [np.full(len(one), value) for one, value in zip(done.nis, done.noise_scale, strict=True)]
         nothing = np.zeros(0)
-        called = [Called(track) for track in told.track_id.tolist()]
-        states, when = (told.mean, told.covariance), np.full(len(called), t)
+        called = [Called(track) for track in reported.track_id.tolist()]
+        states, when = (reported.mean, reported.covariance), np.full(len(called), t)
         self._answer = Answer(
-            rows_of(when, called, states, told.real, told.used, self._told),
-            (told.mean.reshape(-1, 2 * STATES), told.covariance.reshape(-1, 2 * STATES**2)),
-            np.concatenate([*done.takers, np.zeros(0, np.int64)]),
+            rows_of(when, called, states, reported.real, reported.used, self._output),
+            (reported.mean.reshape(-1, 2 * STATES), reported.covariance.reshape(-1, 2 * STATES**2)),
+            np.concatenate([*done.assigned, np.zeros(0, np.int64)]),
             tracks.track_id,
             (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
         )
         kept = np.isin(tracks.track_id, self._state.tracks.track_id)
         confirmed = tracks.evidence.confirmed_s == t
         missed = np.where(confirmed, 0.0, tracks.evidence.missed)
-        later = _later(tracks.track_id, self._answer.takers, owners)
+        later = _later(tracks.track_id, self._answer.assigned, owners)
         flags = tracks.real, tracks.used, confirmed, missed, kept
         gaps = done.gaps, self._state.gaps
-        self._last = StepRecord(t, begins_anew, tracks.track_id, done.records, *flags, *gaps, later)
+        self._last = StepRecord(t, is_reset, tracks.track_id, done.records, *flags, *gaps, later)
 
     def record(self) -> StepRecord:
         """Return what the last step gave the smoother."""
@@ -130,9 +130,9 @@ class ReferenceModel(OneModel):
             raise TypeError("this record is of another engine")
         return record
 
-    def begin_anew(self, t: float) -> None:
+    def reset(self, t: float) -> None:
         """End all tracks and go on from another time (s), as if none had passed; what was learnt stays."""
-        begin_anew(self._state, t, self.constants)
+        reset(self._state, t, self.constants)
         self._answer = _no_answer()
         if self._histories is not None:
             self._histories.end_all(self._state.gaps)
@@ -159,9 +159,9 @@ class ReferenceModel(OneModel):
         """Return their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7."""
         return self._answer.states
 
-    def takers(self) -> IntArray:
+    def assigned(self) -> IntArray:
         """Return the identity of the track (M,) that took each box of the last step."""
-        return self._answer.takers
+        return self._answer.assigned
 
     def living(self) -> IntArray:
         """Return the identities (N,) of the tracks of the last step, before any ended."""
@@ -196,9 +196,9 @@ class ReferenceModel(OneModel):
         """Return width and height of the picture (px), as far as is known."""
         return self._state.picture
 
-    def last_looks(self) -> FloatArray:
-        """Return when each sensor (S,) looked last (s), NaN for never."""
-        return self._state.last_look_s
+    def last_scans(self) -> FloatArray:
+        """Return the time of each sensor's (S,) last scan (s), NaN before it."""
+        return self._state.last_scan_s
 
     def boxes_end_at_edge(self) -> bool:
         """Return whether boxes end at the edge of the picture more often than they reach beyond it."""
@@ -234,11 +234,11 @@ class ReferenceModel(OneModel):
         raise lacking(self.name, "is not saved; tracker.engine=core is")
 
 
-def _later(track_id: IntArray, takers: IntArray, owners: FloatArray | None) -> FloatArray:
+def _later(track_id: IntArray, assigned: IntArray, owners: FloatArray | None) -> FloatArray:
     """Return what is known by later (N,) of the tracks that took a box; -1 for the others."""
     out = np.full(len(track_id), -1.0)
     if owners is not None:
-        np.maximum.at(out, np.searchsorted(track_id, takers), owners[:, 2])
+        np.maximum.at(out, np.searchsorted(track_id, assigned), owners[:, 2])
     return out
 
 

@@ -120,7 +120,7 @@ class SensorScan(NamedTuple):
         sensor: its index.
         boxes: (M, 4) left, top, right, bottom (px).
         logits: (M,) of their scores.
-        alike: (N, M) ln of how much more likely each box is of a track than of another by what both look
+        similarity: (N, M) ln of how much more likely each box is of a track than of another by what both look
             like, of the first N tracks; None where nothing is known of that.
         edges: (M, 2, 2) by axis and side which end at the edge of the picture; `correct_boxes` writes it.
         owners: (M,) whose each box is, -1 for nobody's, at most one of each owner; None where the tracker
@@ -131,7 +131,7 @@ class SensorScan(NamedTuple):
     sensor: int
     boxes: FloatArray
     logits: FloatArray
-    alike: FloatArray | None = None
+    similarity: FloatArray | None = None
     edges: BoolArray = np.zeros((0, 2, 2), dtype=np.bool_)
     owners: IntArray | None = None
     awaited: BoolArray | None = None
@@ -145,23 +145,24 @@ class ReferenceState:
         tracks: the living tracks.
         t: time of the last step (s); None before the first. `predict`
         next_id: identity of the next track. `begin_tracks`
-        picture: width and height (px); 1 x 1 and growing with the boxes where it is not known. `look`
+        picture: width and height (px); 1 x 1 and growing with the boxes where it is not known. `begin_scan`
         picture_known: whether it is.
         process_noise: of the scene. `learn_noise`
         camera: variances of the camera's motion. `follow_camera`
         camera_velocity: its velocity as the last picture showed it. `follow_picture`
         gaps: how gaps ended. `count_gaps`, and `end_tracks` for those that never end
-        sensors: what is believed of each. `learn`; indifference points: `look`
+        sensors: what is believed of each. `learn`; decision thresholds: `begin_scan`
         ended: evidence of the last tracks that ended. `end_tracks`
         learnt_s: when sensors were learnt last (s). `learn`
         offsets: what two sensors' boxes differ by. `compare_sensors`
         log_side_variance: (S,) ln ρ² of the sensors' sides. `learn_noise`
         leftovers: (S,) running mean of boxes a scan that no track takes. `count_clutter`
         false_boxes: (S,) the same of boxes that are of nothing real. `count_false_boxes`
-        period_s: (S,) running mean of the time between two scans (s); NaN before the second. `look`
-        last_look_s: (S,) time of the last scan (s); NaN before it. `look`
-        boxes_at_edge, boxes_beyond: (S,) boxes that end at the edge of the picture, and beyond it. `look`
-        repetition: of S sensors, which boxes come again. `look`
+        period_s: (S,) running mean of the time between two scans (s); NaN before the second. `begin_scan`
+        last_scan_s: (S,) time of the last scan (s); NaN before it. `begin_scan`
+        boxes_at_edge, boxes_beyond: (S,) boxes that end at the edge of the picture, and beyond it.
+            `begin_scan`
+        repetition: of S sensors, which boxes come again. `begin_scan`
         even_logit: (S,) logit of the score at which the user says that a box is as likely real as not; NaN
             where it is learnt.
     """
@@ -183,7 +184,7 @@ class ReferenceState:
     leftovers: FloatArray
     false_boxes: FloatArray
     period_s: FloatArray
-    last_look_s: FloatArray
+    last_scan_s: FloatArray
     boxes_at_edge: FloatArray
     boxes_beyond: FloatArray
     repetition: tuple[RepeatCounts, ...]
@@ -198,7 +199,7 @@ class ReferenceState:
     @property
     def log_scene_variance(self) -> float:
         """Mean of ln ρ² of the sensors that have looked: the scale of the errors that last."""
-        return float(self.log_side_variance[~np.isnan(self.last_look_s)].mean())
+        return float(self.log_side_variance[~np.isnan(self.last_scan_s)].mean())
 
     @property
     def num_sensors(self) -> int:
@@ -227,7 +228,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         leftovers=none,
         false_boxes=none,
         period_s=none,
-        last_look_s=none,
+        last_scan_s=none,
         boxes_at_edge=none,
         boxes_beyond=none,
         repetition=(),
@@ -236,7 +237,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
 
 
 def declare_sensor(state: ReferenceState, c: ModelConstants, even_logit: float = math.nan) -> None:
-    """Add a sensor that has not looked yet, of which what is usual is believed but for what the user says."""
+    """Add a sensor without a scan yet, of which what is usual is believed but for what the user says."""
     new, old = object_probability.initial_sensor(c), state.sensors
     columns = (np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True))
     state.sensors = SensorBelief._make([*columns, old.noise_share])
@@ -246,7 +247,7 @@ def declare_sensor(state: ReferenceState, c: ModelConstants, even_logit: float =
     state.leftovers = np.append(state.leftovers, c.first_leftovers)
     state.false_boxes = np.append(state.false_boxes, c.first_leftovers)
     state.period_s = np.append(state.period_s, np.nan)
-    state.last_look_s = np.append(state.last_look_s, np.nan)
+    state.last_scan_s = np.append(state.last_scan_s, np.nan)
     state.boxes_at_edge = np.append(state.boxes_at_edge, 0.0)
     state.boxes_beyond = np.append(state.boxes_beyond, 0.0)
     state.repetition = (*state.repetition, score_calibration.no_repetition())

@@ -42,7 +42,7 @@ class SmoothedInstants:
         while self._wanted and self._wanted[0] < t - _LAGS_KEPT * self._lag_s:
             self._wanted.popleft()
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Let times begin again from any moment."""
         self._bin = -math.inf
 

@@ -22,13 +22,13 @@ class Updates:
     """A tracker's way in for a detector's results; see `Tracker`."""
 
     if TYPE_CHECKING:
-        logs_takers: bool
+        logs_assigned: bool
         _class_ids: dict[str, int]
 
         def step(self, scans: ScanLike | Sequence[ScanLike]) -> Trajectories:
             """Take in scans of one time."""
 
-        def takers(self, count: int) -> IntArray:
+        def assigned(self, count: int) -> IntArray:
             """Which track took each detection of the last step."""
 
     def update(
@@ -63,12 +63,12 @@ class Updates:
         found = boxes_of(source, scores, classes, format)
         looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
         own = is_supervision(source)
-        self.logs_takers = self.logs_takers or own
+        self.logs_assigned = self.logs_assigned or own
         scan = Scan(t, sensor, found.boxes, found.scores, found.classes, looks)
         self._class_ids = {**self._class_ids, **found.class_ids}
         table = self.step(scan)
         if not own:
             return table
-        taker = np.zeros(len(found.kept), dtype=np.int64)
-        taker[found.kept] = self.takers(len(scan))
-        return replace(table, own=OwnDetections(source, taker))
+        assigned = np.zeros(len(found.kept), dtype=np.int64)
+        assigned[found.kept] = self.assigned(len(scan))
+        return replace(table, own=OwnDetections(source, assigned))

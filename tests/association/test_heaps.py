@@ -84,7 +84,7 @@ def test_core_and_reference_agree_on_heaps(constants):
             one, other = [tracker.step((0.05 * k, "rgb", boxes, scores)) for tracker in trackers]
         np.testing.assert_array_equal(one.track_id, other.track_id)
         np.testing.assert_allclose(one.mean, other.mean, rtol=1e-8, atol=1e-8)
-        np.testing.assert_array_equal(*(tracker.takers(36) for tracker in trackers))
+        np.testing.assert_array_equal(*(tracker.assigned(36) for tracker in trackers))
     assert trackers[0].num_tracks == trackers[1].num_tracks > 4
 
 
@@ -104,11 +104,11 @@ def test_thousands_of_boxes_on_one_spot_are_told_of_once_and_cost_no_more_than_s
     assert "NMS" in str(told[0].message)
     assert preset == "paper" or len(table) >= 1
     assert tracker.num_tracks < 100
-    takers = tracker.takers(count)
-    assert len(takers) == count
-    assert (takers > 0).sum() <= 100
+    assigned = tracker.assigned(count)
+    assert len(assigned) == count
+    assert (assigned > 0).sum() <= 100
     if preset == "default":
-        assert (takers[np.argsort(-scores)[:32]] > 0).all()
+        assert (assigned[np.argsort(-scores)[:32]] > 0).all()
         tracker.save(tmp_path / "state.npz")
         other = Tracker.load(tmp_path / "state.npz")
-        np.testing.assert_array_equal(other.takers(count), takers)
+        np.testing.assert_array_equal(other.assigned(count), assigned)

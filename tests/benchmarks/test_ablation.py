@@ -21,7 +21,7 @@ SHIPPED = ModelConstants()
 #: Found only where something cuts boxes, where two sensors differ in size, or where scores tell little.
 QUIET = {
     "sides that show again",
-    "the indifference point (fixed at even odds)",
+    "the decision threshold (fixed at even odds)",
     "gaps that begin with a box that confirms",
 }
 

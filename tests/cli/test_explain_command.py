@@ -34,7 +34,7 @@ def test_a_car_is_reported_because_of_its_scores_and_looks(folder, capsys):
     assert "track 1: from 0.000 to 2.900 s" in text
     assert "reported first at" in text
     assert "cam: scores +" in text
-    assert "cam: looks" in text
+    assert "cam: hits and misses" in text
 
 
 def test_a_window_is_not_and_the_reason_is_said(folder, capsys):

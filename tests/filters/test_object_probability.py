@@ -54,13 +54,13 @@ def sensors_of(
     number,
     p_detect=0.7,
     unseen=0.1,
-    indifference=-1.0,
+    decision_threshold=1.0,
     prior_odds=0.3,
     noise=0.5,
     stationary_unseen=0.3,
     agreed=0.0,
 ):
-    values = (p_detect, unseen, stationary_unseen, indifference, prior_odds, 3.0, 0.8, agreed)
+    values = (p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, 3.0, 0.8, agreed)
     rows = [np.full(number, value) for value in values]
     return op.SensorBelief(*rows, noise_share=noise)
 
@@ -126,7 +126,7 @@ def enumerated(evidence, sensors):
 def weighed_by_hand(evidence, sensors, s):
     """Log odds by the scores of a sensor: what others contradict and is unlike agreed scores says little."""
     z, hits, misses = evidence.peak[0, s], evidence.hits[0], evidence.misses[0]
-    given = sensors.indifference[s] + z
+    given = z - sensors.decision_threshold[s]
     if given <= 0.0:
         return given
     alone, silent = 1.0, 0.0
@@ -164,7 +164,7 @@ def test_posterior_is_the_enumeration_of_hypotheses(hits, misses, scores, gained
 
 def test_a_coincidence_is_no_testimony_of_a_blind_sensor():
     """A parked vehicle that one sensor sees; the other finds a poor box there once in hundreds of looks."""
-    sensors = sensors_of(2, stationary_unseen=0.05, prior_odds=1.0, indifference=0.3)
+    sensors = sensors_of(2, stationary_unseen=0.05, prior_odds=1.0, decision_threshold=-0.3)
     silent = evidence_of([60.0, 0.0], [1.0, 60.0], [2.5, np.nan], gained=30.0, stood=1.0)
     once = evidence_of([60.0, 0.02], [1.0, 60.0], [2.5, -1.0], gained=30.0, stood=1.0)
     before, after = (op.posterior(one, sensors, C).log_odds[0] for one in (silent, once))
@@ -196,7 +196,7 @@ def test_hits_of_one_sensor_alone_say_nothing_of_what_repeats(first, more, score
     few = op.posterior(evidence_of([first], [0.0], [score], gained=1e3), sensors, C).log_odds[0]
     many = op.posterior(evidence_of([first + more], [0.0], [score], gained=1e3), sensors, C).log_odds[0]
     assert abs(many - few) < 0.12  # no more than −ln(1 − g)
-    assert many == pytest.approx(score + sensors.indifference[0], abs=0.12)
+    assert many == pytest.approx(score - sensors.decision_threshold[0], abs=0.12)
 
 
 @given(hits=st.floats(0, 1e3), misses=st.floats(0, 1e3), silent=st.floats(0, 1e4))
@@ -291,7 +291,7 @@ def test_a_good_score_that_others_contradict_says_little_where_it_is_unlike_thos
     for _ in range(20):
         evidence = evidence.append(both)
     false = evidence_of([0.0, 30.0], [40.0, 6.0], [np.nan, 1.9], owner=1, gained=60.0)
-    believed = sensors_of(2, indifference=0.45, unseen=C.unseen_share, prior_odds=0.0)
+    believed = sensors_of(2, decision_threshold=-0.45, unseen=C.unseen_share, prior_odds=0.0)
     assert op.posterior(false, believed, C).real[0] > 0.6
     learnt = op.learn_sensors(evidence.append(false), believed, C)
     assert learnt.agreed_mean[1] == pytest.approx(3.4, abs=1e-6)
@@ -325,7 +325,7 @@ def test_a_gap_is_what_was_to_be_expected():
     for _ in range(4):
         evidence = expect_hits(evidence, np.array([0.8]), np.array([1.0]), ScanClock(0.0, 0.1, 0.3), C)
         evidence = expect_hits(evidence, np.array([0.5]), np.array([0.1]), ScanClock(0.0, 0.01, 0.03), C)
-    assert evidence.missed[0] == pytest.approx(4 * (0.8 + 0.5 * 0.1 * 0.01 / C.full_look_s))
+    assert evidence.missed[0] == pytest.approx(4 * (0.8 + 0.5 * 0.1 * 0.01 / C.full_scan_s))
     for confirms, left in ((False, evidence.missed[0]), (True, 0.0)):
         hits = Hits(np.array([0]), np.zeros(1), np.zeros(1), np.array([False]), np.array([confirms]))
         found = count_hits(evidence, hits, 0, ScanClock(0.1, 0.1, 0.3), C)

@@ -103,8 +103,8 @@ def test_scores_above_which_boxes_come_again_are_found():
         counts = score_calibration.count_repetition(counts, boxes, logits, C)
     assert -0.5 < score_calibration.half_as_many(counts, C) < 2.5
     z = score_calibration.half_as_many(counts, C)
-    want = -(C.indifference_offset + C.indifference_slope * z)
-    assert score_calibration.indifference(counts, C) == pytest.approx(want)
+    want = C.threshold_offset + C.threshold_slope * z
+    assert score_calibration.decision_threshold(counts, C) == pytest.approx(want)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -142,7 +142,7 @@ def test_told_acceleration_is_the_second_derivative_of_the_image(depth):
     mean[0, :, singer.POSITION] = X / depth
     mean[0, :, singer.VELOCITY] = X_dot / depth - X * Z_dot / depth**2
     mean[0, :, singer.GROWTH] = -Z_dot / depth
-    told = singer.told_motion(mean, undamped)[0, :, singer.ACCELERATION]
+    told = singer.reported_motion(mean, undamped)[0, :, singer.ACCELERATION]
     want = -2.0 * X_dot * Z_dot / depth**2 + 2.0 * X * Z_dot**2 / depth**3
     np.testing.assert_allclose(told, want, rtol=1e-9)
 
@@ -154,7 +154,7 @@ def test_told_acceleration_is_the_rate_of_the_predicted_velocity():
     F = singer.in_perspective(singer.discretise(dt, C).F, mean, dt, C)
     after = (F @ mean[..., None])[..., 0]
     rate = (after - mean)[..., singer.VELOCITY] / dt
-    np.testing.assert_allclose(singer.told_motion(mean, C)[..., singer.ACCELERATION], rate, rtol=1e-3)
+    np.testing.assert_allclose(singer.reported_motion(mean, C)[..., singer.ACCELERATION], rate, rtol=1e-3)
 
 
 def test_told_covariance_is_that_of_the_joint_state():
@@ -170,11 +170,11 @@ def test_told_covariance_is_that_of_the_joint_state():
     def of_object(flat):  # without what lasts of the errors, which the variances are not of
         state = flat.reshape(2, singer.STATES).copy()
         state[:, singer.MOTION :] = 0.0
-        return singer.told_motion(state, C)
+        return singer.reported_motion(state, C)
 
     h = 1e-6
     steps = np.eye(2 * singer.STATES) * h
     J = np.stack([(of_object(mean.ravel() + s) - of_object(mean.ravel() - s)) / (2.0 * h) for s in steps], -1)
-    got = singer.told_covariance(mean, P, C)
+    got = singer.reported_covariance(mean, P, C)
     for axis in range(2):
         np.testing.assert_allclose(got[axis], J[axis] @ joint @ J[axis].T, rtol=1e-6, atol=1e-6)

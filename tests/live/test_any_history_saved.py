@@ -132,7 +132,7 @@ def test_after_any_calls_a_tracker_is_saved_and_goes_on(acts, cut, name, diagnos
 def act(tracker, what, t, count, smooths):
     """Do one thing with a tracker; what it says then."""
     if what == "anew":
-        tracker.begin_anew(t)
+        tracker.reset(t)
     elif what == "number":
         tracker.number_on_from(count)
     elif what == "finish":
@@ -144,7 +144,7 @@ def act(tracker, what, t, count, smooths):
             return str(error)
     updates = table_bytes_of_updates(tracker) if tracker.has_diagnostics else ()
     smoothed = table_bytes(tracker.smoothed()) if smooths else ()
-    return table_bytes(tracker.causal()), tracker.takers(count).tolist(), updates, smoothed
+    return table_bytes(tracker.causal()), tracker.assigned(count).tolist(), updates, smoothed
 
 
 def table_bytes_of_updates(tracker):

@@ -383,9 +383,9 @@ def test_time_begins_anew_from_the_end_of_the_numbers():
     tracker = Tracker(CONFIG)
     tracker.step(scan_at(0.0))
     tracker.step(scan_at(1.7e308))
-    tracker.begin_anew(-1.7e308)
+    tracker.reset(-1.7e308)
     tracker.step(scan_at(-1.7e308))
-    assert tracker.last_looks() == {"rgb": -1.7e308}
+    assert tracker.last_scans() == {"rgb": -1.7e308}
     for _ in range(5):  # the next later time is 2e292 s away
         now = tracker.step(scan_at(-1.7e308))
     assert len(now) == 1

@@ -8,17 +8,17 @@ import pytest
 from jeat_graph import Tracker, load_config
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.tracking.appearance import Looks, compare, remember
+from jeat_graph.tracking.appearance import Appearances, compare, remember
 
 NUMBERS = 32
 
 
-def scans(seed: int, looks: str, steps: int = 100):
+def scans(seed: int, appearance: str, steps: int = 100):
     """Four vehicles; two stand side by side, are hidden, and then are more than half their distance on.
 
     Args:
         seed: of noise and order.
-        looks: `own` embeddings for each vehicle, `any` at random, or `none`.
+        appearance: `own` embeddings for each vehicle, `any` at random, or `none`.
         steps: at 20 Hz.
 
     Yields:
@@ -35,10 +35,10 @@ def scans(seed: int, looks: str, steps: int = 100):
         )
         seen = rng.permutation(4)
         noise = rng.normal(size=(4, NUMBERS))
-        found = shared + own + 0.3 * noise if looks == "own" else noise
+        found = shared + own + 0.3 * noise if appearance == "own" else noise
         if 3.0 < t < 3.5:
             seen = seen[seen > 1]
-        told = None if looks == "none" else found[seen]
+        told = None if appearance == "none" else found[seen]
         yield Scan(t, "rgb", boxes[seen], np.full(len(seen), 0.9), None, told), seen
 
 
@@ -55,7 +55,7 @@ def test_a_saved_tracker_goes_on_as_the_other(tmp_path):
     again = Tracker.load(tmp_path / "state.npz")
     for scan in rest[50:]:
         np.testing.assert_array_equal(tracker.step(scan).mean, again.step(scan).mean)
-    for one, other in zip(tracker.snapshot().looks, again.snapshot().looks, strict=True):
+    for one, other in zip(tracker.snapshot().appearance, again.snapshot().appearance, strict=True):
         np.testing.assert_array_equal(one, other)
 
 
@@ -67,7 +67,7 @@ def test_embeddings_of_another_length_are_refused_and_change_nothing():
     with pytest.raises(DataError, match="32 numbers as those before, not 3"):
         tracker.step(Scan(1.0, "rgb", [[1, 2, 30, 40]], [0.9], None, np.ones((1, 3))))
     assert tracker.num_born == born
-    assert before.looks is tracker.snapshot().looks
+    assert before.appearance is tracker.snapshot().appearance
 
 
 def test_update_takes_them_too():
@@ -84,7 +84,7 @@ def test_the_ratio_is_that_of_two_normal_distributions():
     """By lists of cosines, one by one, the textbook's pooled variance, and some before anything was seen."""
     rng = np.random.default_rng(5)
     own = rng.normal(size=(3, 8))
-    looks, living = Looks.start(2, 8), np.array([4, 7, 9])
+    appearance, living = Appearances.start(2, 8), np.array([4, 7, 9])
     memory: dict[tuple[int, int], np.ndarray] = {}
     same: dict[int, list[float]] = {0: [], 1: []}
     others: dict[int, list[tuple[float, float]]] = {0: [], 1: []}
@@ -94,8 +94,8 @@ def test_the_ratio_is_that_of_two_normal_distributions():
         found = (found / np.linalg.norm(found, axis=1, keepdims=True)).astype(np.float32)
         exact = found.astype(np.float64)
         order = rng.permutation(3)
-        compared = compare(looks.of(living), found[order], sensor, 50.0)
-        looks = remember(compared, living[order], np.arange(3), living)
+        compared = compare(appearance.of(living), found[order], sensor, 50.0)
+        appearance = remember(compared, living[order], np.arange(3), living)
         s = step % 2
         seen = [k for k in range(3) if (s, k) in memory]
         for j in order.tolist():
@@ -106,7 +106,7 @@ def test_the_ratio_is_that_of_two_normal_distributions():
                 others[s].append((rest.mean(), (rest**2).mean()))
         for j in range(3):
             memory[s, j] = exact[j] if (s, j) not in memory else 0.9 * memory[s, j] + 0.1 * exact[j]
-    slope, middle = looks.ratio()
+    slope, middle = appearance.ratio()
     for s in (0, 1):
         a, b = np.array(same[s]), np.array(others[s])
         pooled = (a.sum() + b[:, 0].sum()) / (len(a) + len(b))

@@ -21,7 +21,7 @@ from jeat_graph.smoothers.rows import Called, in_order
 from jeat_graph.tracking.core_model import CoreModel
 from jeat_graph.tracking.engine import StepInput
 from jeat_graph.tracking.model_tracker import ModelTracker
-from jeat_graph.tracking.one_model import told_of
+from jeat_graph.tracking.one_model import row_output
 from jeat_graph.tracking.reference_model import ReferenceModel
 
 #: Where doubles of one order of operations differ from those of another, by condition.
@@ -112,7 +112,7 @@ def test_every_step_is_the_references(seed, sensors, known, motions):
         reference.take(looked(*scans))
         reference.hand_over()
         assert_alike(core.rows(), reference.rows(), f"step {k}")
-        np.testing.assert_array_equal(core.takers(), reference.takers())
+        np.testing.assert_array_equal(core.assigned(), reference.assigned())
         np.testing.assert_array_equal(core.living(), reference.living())
         assert core.size() == reference.size()
     ours, theirs = core.learnt(), reference.learnt()
@@ -143,7 +143,7 @@ def test_whole_tracks_are_smoothed_as_by_the_reference(seed, motions):
 def test_the_cores_smoother_is_the_one_in_numpy_over_its_records(seed, motions, lag):
     smoother = "engine=full" if math.isinf(lag) else f"engine=fixed-lag lag_s={lag}"
     core, recorder = models(smoother, True)[0], models(smoother, True)[0]
-    ours = Histories(lag, Existence(ModelConstants()), told_of(ModelConstants()))
+    ours = Histories(lag, Existence(ModelConstants()), row_output(ModelConstants()))
     for _ in range(2):
         declare(core)
         declare(recorder)

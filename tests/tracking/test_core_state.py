@@ -178,12 +178,12 @@ def test_time_begins_anew_as_if_none_had_passed():
     for scan in traffic(times=40):
         tracker.step(scan)
     born, learnt = tracker.num_born, tracker.sensor_states()
-    tracker.begin_anew(-50.0)
+    tracker.reset(-50.0)
     assert tracker.num_tracks == 0
     assert tracker.time is None
     assert not len(tracker.causal())
     assert tracker.sensor_states() == learnt
-    assert all(t < -50.0 for t in tracker.last_looks().values())
+    assert all(t < -50.0 for t in tracker.last_scans().values())
     tracker.step((-50.0, "cam", [[10, 10, 40, 40]], [0.9]))
     assert tracker.num_born == born + 1
 
@@ -288,7 +288,7 @@ def test_a_state_with_any_wrong_array_is_refused_or_harms_nobody(tmp_path, smoot
         ("order", np.zeros(3)),
         ("order", None),
         ("classes", 5),
-        ("looks", np.zeros(3)),
+        ("appearance", np.zeros(3)),
         ("model", {}),
         ("model", 3),
         ("boxes", None),

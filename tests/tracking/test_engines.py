@@ -61,8 +61,8 @@ def test_every_tracker_is_a_tracker(engine):
     assert tracker.num_tracks == tracker.num_born == 2
     assert tracker.time == pytest.approx(1.45)
     assert tracker.causal().track_id.tolist() == [1, 2]
-    assert tracker.takers(2).tolist() == [1, 2]
-    assert tracker.last_looks()["rgb"] == tracker.time
+    assert tracker.assigned(2).tolist() == [1, 2]
+    assert tracker.last_scans()["rgb"] == tracker.time
     assert tracker.sensor_states().keys() == tracker.learnt().keys() == {"rgb"}
     assert tracker.predict(1.5).track_id.tolist() == [1, 2]
 

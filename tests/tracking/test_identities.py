@@ -61,7 +61,7 @@ def given(request):
         looked = owned_step(rng, t, place, sensors)
         for model in models:
             model.take(looked)
-        assert np.array_equal(*(model.takers() for model in models))
+        assert np.array_equal(*(model.assigned() for model in models))
         assert np.array_equal(*(model.identities() for model in models))
         taken = [model.record() for model in models]
         records.append([model.step_record(one) for model, one in zip(models, taken, strict=True)])
@@ -253,12 +253,12 @@ def test_a_tracker_that_was_saved_decides_the_same(tmp_path):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("takers", -1),
+        ("assigned", -1),
         ("real", 2.0),
         ("real", np.nan),
         ("boxes", np.nan),
         ("scan_t", np.inf),
-        ("takers", None),
+        ("assigned", None),
     ],
 )
 def test_a_log_that_no_tracker_keeps_is_refused(tmp_path, name, value):

@@ -222,9 +222,9 @@ def test_the_score_at_which_a_box_is_as_likely_real_as_not_is_believed(engine):
         for t, sensor, boxes, _ in moving(20):
             table = tracker.step((t, sensor, boxes, [0.6, 0.6]))
         born[even] = float(tracker.step((1.0, "cam", [], [])).existence.sum()) if len(table) else 0.0
-        learnt = tracker._model.learnt().belief.indifference
+        learnt = tracker._model.learnt().belief.decision_threshold
         if even != "null":
-            assert learnt[0] == pytest.approx(-float(logit(np.array(float(even)))))
+            assert learnt[0] == pytest.approx(float(logit(np.array(float(even)))))
     assert born[".95"] < born[".2"]
 
 
@@ -301,3 +301,13 @@ def test_corners_are_taken_where_they_are_named():
 def test_tables_know_their_instant_where_they_have_no_row():
     table = made().step((3.0, "cam", [], []))
     assert table.instants.tolist() == [3.0]
+
+
+def test_old_names_warn_and_do_the_same():
+    tracker = Tracker("default", image=(1920, 1080))
+    tracker.step((0.0, "rgb", [[100, 100, 40, 30]], [0.9]))
+    with pytest.warns(DeprecationWarning, match="is now called assigned"):
+        assert tracker.takers(1).tolist() == tracker.assigned(1).tolist() == [1]
+    with pytest.warns(DeprecationWarning, match="is now called reset"):
+        tracker.begin_anew(-5.0)
+    assert tracker.num_tracks == 0

@@ -195,12 +195,12 @@ def test_time_may_begin_anew_and_the_rows_before_are_kept(scene):
     for batch in batches:
         tracker.step(batch)
     born, reported = tracker.num_born, len(tracker.causal())
-    tracker.begin_anew(0.0)
+    tracker.reset(0.0)
     assert tracker.num_tracks == 0
     for batch in batches:
         tracker.step(batch)
     assert tracker.living()[1] == tracker.num_born + 1 == 2 * born + 1
-    assert tracker.last_looks() == {"evt": batches[-1][0].t, "rgb": 2.45}
+    assert tracker.last_scans() == {"evt": batches[-1][0].t, "rgb": 2.45}
     rows = tracker.finish()
     assert reported > 0
     assert (rows.track_id <= born).sum() == (rows.track_id > born).sum()

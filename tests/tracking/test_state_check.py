@@ -112,7 +112,7 @@ def test_a_pipe_is_not_waited_for(tmp_path):
         "model",
         "sensors",
         "classes",
-        "looks",
+        "appearance",
         "order",
         "boxes",
         "class_ids",

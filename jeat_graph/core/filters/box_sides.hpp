@@ -78,7 +78,7 @@ inline Edges edges_of(const Sides& box, double width, double height, const Model
 }
 
 // Sides at the edge that lie inwards of what is expected: the edge has cut them, and they measure nothing.
-inline Edges unmeasured(const std::array<double, 4>& y, const Edges& edges) {
+inline Edges unmeasured_sides(const std::array<double, 4>& y, const Edges& edges) {
     return {{edges.at[0] && y[0] > 0.0, edges.at[1] && y[1] < 0.0, edges.at[2] && y[2] > 0.0, edges.at[3] && y[3] < 0.0}};
 }
 
@@ -181,10 +181,10 @@ inline bool uncover(double* mean, double* P, double& left, double& right, const 
 
 // The same on both axes; what is left of the innovations y. Says whether a side shows again.
 inline bool uncover_sides(double* mean, double* covariance, std::array<double, 4>& y, const SidesExpected& expected,
-                          const Edges& gone, const ModelConstants& c) {
+                          const Edges& unmeasured, const ModelConstants& c) {
     bool shows = false;
     for (int axis = 0; axis < 2; ++axis)
-        if (!gone.at[2 * axis] && !gone.at[2 * axis + 1])
+        if (!unmeasured.at[2 * axis] && !unmeasured.at[2 * axis + 1])
             shows |= uncover(mean + axis * kStates, covariance + axis * kMatrix, y[2 * axis], y[2 * axis + 1],
                              expected.S[axis], expected.size[axis], c);
     return shows;
@@ -193,7 +193,7 @@ inline bool uncover_sides(double* mean, double* covariance, std::array<double, 4
 // Update a track by a box: heavy tails, and sides that are cut, have less weight. Left over are the innovations y of
 // the state as it is after `uncover_sides`.
 inline void update(double* mean, double* covariance, const std::array<double, 4>& y, const std::array<double, 4>& left_over,
-                   const SidesExpected& expected, const Edges& gone, const ModelConstants& c) {
+                   const SidesExpected& expected, const Edges& unmeasured, const ModelConstants& c) {
     const double heavy = 1.0 / student_weight(squared_distance(y, expected.S), c);
     for (int axis = 0; axis < 2; ++axis) {
         const double left = y[2 * axis], right = y[2 * axis + 1];
@@ -202,8 +202,8 @@ inline void update(double* mean, double* covariance, const std::array<double, 4>
         const double R = expected.variance[axis] * (cut[0] + cut[1] > 0.5 ? 1.0 : heavy);
         const double none = square(kUnmeasured * expected.size[axis]);
         update_axis(m, P, left_over[2 * axis], left_over[2 * axis + 1], exp_of(m[kLogSize] + m[kSizeError]),
-                    gone.at[2 * axis] ? none : R / std::max(1.0 - cut[0], kLeastProbability),
-                    gone.at[2 * axis + 1] ? none : R / std::max(1.0 - cut[1], kLeastProbability));
+                    unmeasured.at[2 * axis] ? none : R / std::max(1.0 - cut[0], kLeastProbability),
+                    unmeasured.at[2 * axis + 1] ? none : R / std::max(1.0 - cut[1], kLeastProbability));
     }
 }
 

@@ -19,7 +19,7 @@ struct ScanClock {
     ScanClock(double t, double period_s, const ModelConstants& c)
         : t(t), period_s(period_s), weight(std::min(1.0, period_s / c.correlation_time_s)),
           keep_recent(exp_of(-period_s / c.smoothing_s)), keep_total(exp_of(-period_s / c.mean_memory_s)),
-          full(std::min(1.0, period_s / c.full_look_s)) {}
+          full(std::min(1.0, period_s / c.full_scan_s)) {}
 };
 
 struct Evidence {

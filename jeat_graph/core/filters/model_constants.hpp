@@ -71,7 +71,7 @@ struct Bounds {
     JEAT_PAIR(track_p_detect_bounds) \
     JEAT_ONE(track_p_detect_memory_s) \
     JEAT_ONE(p_detect_count) \
-    JEAT_ONE(looks_count) \
+    JEAT_ONE(scan_count) \
     JEAT_ONE(chance_hit) \
     JEAT_ONE(unseen_share) \
     JEAT_PAIR(unseen_bounds) \
@@ -95,17 +95,17 @@ struct Bounds {
     JEAT_ONE(unknown_score) \
     JEAT_ONE(repeat_overlap) \
     JEAT_ONE(repeat_share) \
-    JEAT_ONE(repeat_told) \
+    JEAT_ONE(repeat_trusted) \
     JEAT_ONE(repeat_count) \
     JEAT_ONE(best_share) \
-    JEAT_ONE(indifference_offset) \
-    JEAT_ONE(indifference_slope) \
-    JEAT_PAIR(indifference_bounds) \
+    JEAT_ONE(threshold_offset) \
+    JEAT_ONE(threshold_slope) \
+    JEAT_PAIR(threshold_bounds) \
     JEAT_ONE(visible_to_hidden) \
     JEAT_ONE(hidden_to_visible) \
     JEAT_ONE(visible_to_gone) \
     JEAT_ONE(hidden_to_gone) \
-    JEAT_ONE(full_look_s) \
+    JEAT_ONE(full_scan_s) \
     JEAT_ONE(gap_prior) \
     JEAT_ONE(gap_prior_count) \
     JEAT_ONE(gap_prior_least) \

@@ -12,17 +12,17 @@ namespace jeat::filters {
 
 inline constexpr double kLeastApart = 1e-3, kLeastSum = 1e-9, kMostLogOdds = 30.0;
 inline constexpr int kRounds = 2;
-inline constexpr double kLeastMisses = 0.2, kLeastLooks = 1.0;
+inline constexpr double kLeastMisses = 0.2, kLeastScans = 1.0;
 
 struct SensorBelief {
-    std::vector<double> p_detect, unseen, stationary_unseen, indifference, prior_odds, agreed_mean, agreed_std, agreed_share;
+    std::vector<double> p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share;
     double noise_share;
 
     void widen(const ModelConstants& c) {
         p_detect.push_back(c.p_detect);
         unseen.push_back(c.unseen_share);
         stationary_unseen.push_back(c.stationary_unseen_share);
-        indifference.push_back(0.0);
+        decision_threshold.push_back(0.0);
         prior_odds.push_back(0.0);
         agreed_mean.push_back(0.0);
         agreed_std.push_back(c.agreed_std);
@@ -113,7 +113,7 @@ public:
         const double mean = e.total[at] / std::max(e.total_weight[at], kLeastSum);
         return c_.peak_share * e.peak[at] + (1.0 - c_.peak_share) * mean;
     }
-    // Probability that a sensor does not see a track, by its looks and even odds; some misses may be forgiven.
+    // Probability that a sensor does not see a track, by its scans and even odds; some misses may be forgiven.
     double blindness(const Evidence& e, std::size_t at, std::size_t s, double forgiven) const {
         const double h = e.hits[at], m = e.misses[at] - forgiven;
         const double seen = log_beta(a_[s] + h, b_[s] + m) - log_beta_[s];
@@ -124,7 +124,7 @@ private:
     // A good score that the others contradict says as much as it resembles the scores that they agree with.
     double weighed_score(const Evidence& e, std::size_t row, std::size_t s) const {
         const std::size_t first = row * e.sensors;
-        const double z = score(e, first + s), given = sensors_.indifference[s] + z;
+        const double z = score(e, first + s), given = z - sensors_.decision_threshold[s];
         const double below = (sensors_.agreed_mean[s] - z) / sensors_.agreed_std[s];
         if (!(given > 0.0) || !(sensors_.agreed_share[s] > 0.0) || !(below > 0.0)) return given;
         double alone = 1.0, silent = 0.0;
@@ -149,12 +149,12 @@ private:
 
 // Sums over tracks from which the sensors are learnt.
 struct SensorSums {
-    std::vector<double> hits, looks, unseen, seeable, stationary_unseen, stationary, real, not_real;
+    std::vector<double> hits, scans, unseen, seeable, stationary_unseen, stationary, real, not_real;
     std::vector<double> agreed, agreed_score, agreed_square, sees;
     double noise = 0.0, not_object = 0.0;
 
     explicit SensorSums(std::size_t S)
-        : hits(S, 0.0), looks(S, 0.0), unseen(S, 0.0), seeable(S, 0.0), stationary_unseen(S, 0.0), stationary(S, 0.0),
+        : hits(S, 0.0), scans(S, 0.0), unseen(S, 0.0), seeable(S, 0.0), stationary_unseen(S, 0.0), stationary(S, 0.0),
           real(S, 0.0), not_real(S, 0.0), agreed(S, 0.0), agreed_score(S, 0.0), agreed_square(S, 0.0), sees(S, 0.0) {}
 
     void add(const Evidence& e, PosteriorRule& rule, const ModelConstants& c) {
@@ -169,14 +169,14 @@ struct SensorSums {
                 missed += e.misses[at];
                 const double seen = p * (1.0 - belief.unseen[s]), blind = belief.stationary_unseen[s];
                 const double hs = e.stationary_hits[at], ns = hs + e.stationary_misses[at];
-                const double weight = seen * std::min(1.0, c.looks_count / std::max(n, kLeastSum));
+                const double weight = seen * std::min(1.0, c.scan_count / std::max(n, kLeastSum));
                 hits[s] += weight * (h - blind * hs);
-                looks[s] += weight * (n - blind * ns);
-                if (ns > kLeastLooks) {
+                scans[s] += weight * (n - blind * ns);
+                if (ns > kLeastScans) {
                     stationary_unseen[s] += seen * blind;
                     stationary[s] += seen;
                 }
-                if (n > kLeastLooks) {
+                if (n > kLeastScans) {
                     unseen[s] += p * belief.unseen[s];
                     seeable[s] += p;
                 }
@@ -204,7 +204,7 @@ struct SensorSums {
             for (std::size_t o = 0; o < e.sensors; ++o)
                 if (o != s) others = std::max(others, sees[o]);
             if (!(e.found[first + s] && others > 0.0)) continue;
-            const double weight = others * sees[s] * std::min(1.0, e.hits[first + s] / kLeastLooks);
+            const double weight = others * sees[s] * std::min(1.0, e.hits[first + s] / kLeastScans);
             const double z = rule.score(e, first + s);
             agreed[s] += weight;
             agreed_score[s] += weight * z;
@@ -226,7 +226,7 @@ inline void learn_sensors(const Evidence& ended, const Evidence& living, SensorB
         sums.add(living, rule, c);
         SensorBelief next = sensors;
         for (std::size_t s = 0; s < sensors.p_detect.size(); ++s) {
-            next.p_detect[s] = clamp(beta_share(sums.hits[s], sums.looks[s], c.p_detect, c.p_detect_count),
+            next.p_detect[s] = clamp(beta_share(sums.hits[s], sums.scans[s], c.p_detect, c.p_detect_count),
                                      c.p_detect_bounds.low, c.p_detect_bounds.high);
             next.unseen[s] = clamp(beta_share(sums.unseen[s], sums.seeable[s], c.unseen_share, c.sensor_count),
                                    c.unseen_bounds.low, c.unseen_bounds.high);

@@ -89,17 +89,17 @@ struct RepeatCounts {
         }
         const double top = (best_repeated + kBestCount * c.repeat_share) / (best + kBestCount);
         for (int g = kScoreBins - 1; g >= 0; --g) {
-            const double told = boxes[g] * std::min(1.0, square(top / c.repeat_told));
-            const double share = (told * repeated[g] / (boxes[g] * top + kLeastBoxes) + c.repeat_count * c.repeat_share) /
-                                 (told + c.repeat_count);
+            const double trusted = boxes[g] * std::min(1.0, square(top / c.repeat_trusted));
+            const double share = (trusted * repeated[g] / (boxes[g] * top + kLeastBoxes) + c.repeat_count * c.repeat_share) /
+                                 (trusted + c.repeat_count);
             if (share < 0.5) return kFirstLogit + g * kLogitStep;
         }
         return kFirstLogit;
     }
 
-    double indifference(const ModelConstants& c) const {
-        const double z = clamp(half_as_many(c), c.indifference_bounds.low, c.indifference_bounds.high);
-        return -(c.indifference_offset + c.indifference_slope * z);
+    double decision_threshold(const ModelConstants& c) const {
+        const double z = clamp(half_as_many(c), c.threshold_bounds.low, c.threshold_bounds.high);
+        return c.threshold_offset + c.threshold_slope * z;
     }
 };
 

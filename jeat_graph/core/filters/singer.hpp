@@ -199,20 +199,20 @@ inline void predict(double* mean, double* covariance, const Discretised& step, d
     std::copy(predicted.begin(), predicted.end(), mean);
 }
 
-// What tables tell of a track and its variances, `kMotion` for each axis: told_motion and the diagonal of told_covariance.
-inline void tell_motion(const double* mean, const double* covariance, const ModelConstants& c, double* told,
+// What tables tell of a track and its variances, `kMotion` for each axis: reported_motion and the diagonal of reported_covariance.
+inline void report_motion(const double* mean, const double* covariance, const ModelConstants& c, double* reported,
                         double* variance) {
     const double g = 0.5 * (mean[kGrowth] + mean[kStates + kGrowth]);
     const double by_velocity = 2.0 * g - 1.0 / c.velocity_time_s;
-    for (int axis = 0; axis < 2; ++axis, told += kMotion, variance += kMotion) {
+    for (int axis = 0; axis < 2; ++axis, reported += kMotion, variance += kMotion) {
         const double* const m = mean + axis * kStates;
         const double* const P = covariance + axis * kMatrix;
         const double* const other = covariance + (1 - axis) * kMatrix;
-        for (int k = 0; k < kMotion; ++k) told[k] = m[k], variance[k] = P[k * kStates + k];
-        told[kPosition] += m[kPositionError];
-        told[kLogSize] += m[kSizeError];
+        for (int k = 0; k < kMotion; ++k) reported[k] = m[k], variance[k] = P[k * kStates + k];
+        reported[kPosition] += m[kPositionError];
+        reported[kLogSize] += m[kSizeError];
         const double v = m[kVelocity];
-        told[kAcceleration] += by_velocity * v;
+        reported[kAcceleration] += by_velocity * v;
         // By v, a and the growth of this axis; the other axis's growth has half of g, too.
         const int by[] = {kVelocity, kAcceleration, kGrowth};
         const double slope[] = {by_velocity, 1.0, v};

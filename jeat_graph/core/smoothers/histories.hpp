@@ -53,7 +53,7 @@ struct Rows {
         const std::size_t first = mean.size();
         mean.resize(first + 2 * filters::kMotion);
         variance.resize(first + 2 * filters::kMotion);
-        filters::tell_motion(state, covariance, c, mean.data() + first, variance.data() + first);
+        filters::report_motion(state, covariance, c, mean.data() + first, variance.data() + first);
     }
 };
 
@@ -91,7 +91,7 @@ struct Entry {
 // What the filter did in one step. It is kept apart until no step can come before this one any more.
 struct Record {
     double t = 0.0;
-    bool begins_anew = false;            // all tracks had ended before the step
+    bool is_reset = false;            // all tracks had ended before the step
     std::vector<std::int64_t> track_id;  // of the tracks after it, before any of them ended
     std::vector<std::size_t> tracks;     // how many there were after each scan
     std::vector<std::size_t> known;      // of these, how many had been born before it
@@ -103,7 +103,7 @@ struct Record {
 
     void begin(double time) {
         t = time;
-        begins_anew = false;
+        is_reset = false;
         track_id.clear(), tracks.clear(), known.clear(), sensors.clear(), entries.clear(), growth.clear(), kept.clear();
     }
     // The entries of a scan of so many tracks; more may be born in it.
@@ -141,7 +141,7 @@ public:
 
     // Take a step in, in order of time; `called` is of its tracks.
     void take(const Record& record, std::span<const Called> called, const ModelConstants& c) {
-        if (record.begins_anew) end_all(record.gaps, c);
+        if (record.is_reset) end_all(record.gaps, c);
         check_order(record);
         std::size_t at = 0;
         for (const std::size_t number : record.tracks) {

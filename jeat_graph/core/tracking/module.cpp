@@ -37,7 +37,7 @@ bool finite(std::span<const double> values) {
     return true;
 }
 
-// All that the next step depends on, and what the last one told.
+// All that the next step depends on, and what the last one gave.
 struct Moment {
     State state;
     Answer answer;
@@ -70,10 +70,10 @@ Scans scans_of(const Record& record, const ModelConstants& c) {
             array_of(predicted_covariance, kCovariance), array_of(mean, kMean), array_of(covariance, kCovariance)};
 }
 
-using Told = std::tuple<double, bool, Out<double>, Out<std::int64_t>, Out<std::uint8_t>, Out<double>, Out<std::uint8_t>,
+using Fields = std::tuple<double, bool, Out<double>, Out<std::int64_t>, Out<std::uint8_t>, Out<double>, Out<std::uint8_t>,
                         Out<double>>;
 
-Told told_of(const Record& record) {
+Fields fields_of(const Record& record) {
     std::vector<double> real, missed;
     std::vector<std::int64_t> used;
     std::vector<std::uint8_t> confirmed;
@@ -87,7 +87,7 @@ Told told_of(const Record& record) {
         real.push_back(entry.real), used.push_back(entry.used);
         confirmed.push_back(entry.confirmed), missed.push_back(entry.missed);
     }
-    return {record.t, record.begins_anew, array_of(real), array_of(used), array_of(confirmed), array_of(missed),
+    return {record.t, record.is_reset, array_of(real), array_of(used), array_of(confirmed), array_of(missed),
             array_of(record.kept), array_of(later)};
 }
 
@@ -117,7 +117,7 @@ public:
     }
 
     void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
-              const std::optional<In2<double>>& alike, const std::optional<In<double>>& motion,
+              const std::optional<In2<double>>& similarity, const std::optional<In<double>>& motion,
               const std::optional<In2<double>>& owners) {
         State& state = now_.state;
         check(std::isfinite(t), "no such time");
@@ -126,9 +126,9 @@ public:
         check_lengths({boxes.shape(0), logits.size()});
         check(finite(span(boxes)) && finite(span(logits)), "boxes and logits are finite");
         check(boxes.shape(1) == 4, "boxes have four sides");
-        if (alike) check(alike->shape(0) == state.tracks.size(), "another number of tracks is compared");
-        if (alike) check_lengths({alike->shape(1), logits.size()});
-        if (alike) check(finite(span(*alike)), "what looks say is finite");
+        if (similarity) check(similarity->shape(0) == state.tracks.size(), "another number of tracks is compared");
+        if (similarity) check_lengths({similarity->shape(1), logits.size()});
+        if (similarity) check(finite(span(*similarity)), "similarities are finite");
         if (owners) check_lengths({owners->shape(0), logits.size()});
         if (owners) check(owners->shape(1) == 3, "owners are given with whether more of theirs are to come, and a posterior");
         if (owners) check(finite(span(*owners)), "owners are finite");
@@ -149,8 +149,8 @@ public:
             const Sides* const first = reinterpret_cast<const Sides*>(boxes.data()) + at;
             scan.boxes.assign(first, first + number);
             scan.logits.assign(logits.data() + at, logits.data() + at + number);
-            scan.alike = {nullptr, 0, 0};
-            if (alike) scan.alike = {alike->data() + at, alike->shape(0), alike->shape(1)};
+            scan.similarity = {nullptr, 0, 0};
+            if (similarity) scan.similarity = {similarity->data() + at, similarity->shape(0), similarity->shape(1)};
             scan.owners.clear(), scan.awaited.clear(), scan.later.clear();
             for (std::size_t j = at; owners && j < at + number; ++j) {
                 scan.owners.push_back(static_cast<std::int64_t>(owners->data()[3 * j]));
@@ -161,13 +161,13 @@ public:
         }
         check(at == logits.size(), "more boxes than said");
         const nb::gil_scoped_release release;
-        const auto motion_told = moved ? &*moved : nullptr;
-        if (state.tracks.size() + logits.size() <= kFewRows) return run(t, motion_told);
+        const auto motion_given = moved ? &*moved : nullptr;
+        if (state.tracks.size() + logits.size() <= kFewRows) return run(t, motion_given);
         // A long step is ended by signals, and has not been then.
         const Moment before = now_;
         const HeedsSignals heeds;
         try {
-            run(t, motion_told);
+            run(t, motion_given);
         } catch (...) {
             now_ = before;
             throw;
@@ -176,12 +176,12 @@ public:
     void run(double t, const PictureMotion* moved) {
         const State& state = now_.state;
         Record* const record = smooths_ ? &record_ : nullptr;
-        const bool begins_anew = state.started && t - state.t >= kLongestSilenceS;
+        const bool is_reset = state.started && t - state.t >= kLongestSilenceS;
         record_.begin(t);
-        if (begins_anew) record_.begins_anew = true, step_.begin_anew(t);
+        if (is_reset) record_.is_reset = true, step_.reset(t);
         for (Scan& scan : scans_)
-            if (begins_anew) scan.alike = {nullptr, 0, 0};
-        step_.run(t, scans_, begins_anew ? nullptr : moved, reported_, record);
+            if (is_reset) scan.similarity = {nullptr, 0, 0};
+        step_.run(t, scans_, is_reset ? nullptr : moved, reported_, record);
         write_answer(t);
         step_.end_tracks(record);
     }
@@ -195,22 +195,22 @@ public:
     // Tell the smoother of a step that nothing can come before any more; of the last one without a record.
     void hand_over(const Record* record, std::optional<In<std::int64_t>> given, std::optional<In<std::int64_t>> label,
                    std::optional<In<double>> share) {
-        const Record& told = record ? *record : record_;
-        const std::size_t n = told.track_id.size();
+        const Record& chosen = record ? *record : record_;
+        const std::size_t n = chosen.track_id.size();
         if (given) check_lengths({n, given->size()});
         if (label) check_lengths({n, label->size()});
         if (share) check_lengths({n, share->size()});
         called_.resize(n);
         for (std::size_t i = 0; i < n; ++i)
-            called_[i] = {given ? given->data()[i] : told.track_id[i], label ? label->data()[i] : -1,
+            called_[i] = {given ? given->data()[i] : chosen.track_id[i], label ? label->data()[i] : -1,
                           share ? share->data()[i] : 0.0};
         const nb::gil_scoped_release release;
-        histories_.take(told, called_, now_.state.constants);
+        histories_.take(chosen, called_, now_.state.constants);
     }
 
-    void begin_anew(double t) {
+    void reset(double t) {
         check(std::isfinite(t), "no such time");
-        step_.begin_anew(t);
+        step_.reset(t);
         now_.answer = {};
         histories_.end_all(now_.state.gaps, now_.state.constants);
     }
@@ -245,7 +245,7 @@ public:
     std::tuple<Out2<double>, Out2<double>> states() const {
         return {array_of(now_.answer.mean, kMean), array_of(now_.answer.covariance, kCovariance)};
     }
-    Out<std::int64_t> takers() const { return array_of(now_.answer.takers); }
+    Out<std::int64_t> assigned() const { return array_of(now_.answer.assigned); }
     Out<std::int64_t> living() const { return array_of(now_.answer.living); }
     std::tuple<Out<double>, Out<double>, Out<double>> fit() const {
         return {array_of(now_.answer.nis), array_of(now_.answer.noise_scale), array_of(now_.answer.real)};
@@ -256,9 +256,9 @@ public:
     std::size_t sensors() const { return now_.state.sensors.size(); }
     std::optional<double> time() const { return now_.state.started ? std::optional(now_.state.t) : std::nullopt; }
     std::tuple<double, double> picture() const { return {now_.state.width, now_.state.height}; }
-    Out<double> last_looks() const {
+    Out<double> last_scans() const {
         std::vector<double> out;
-        for (const Sensor& sensor : now_.state.sensors) out.push_back(sensor.last_look_s);
+        for (const Sensor& sensor : now_.state.sensors) out.push_back(sensor.last_scan_s);
         return array_of(out);
     }
 
@@ -295,7 +295,7 @@ public:
         out["agreed_mean"] = array_of(state.belief.agreed_mean);
         out["agreed_std"] = array_of(state.belief.agreed_std);
         out["agreed_share"] = array_of(state.belief.agreed_share);
-        out["indifference"] = array_of(state.belief.indifference);
+        out["decision_threshold"] = array_of(state.belief.decision_threshold);
         out["prior_odds"] = array_of(state.belief.prior_odds);
         std::vector<double> leftovers;
         for (const Sensor& sensor : state.sensors) leftovers.push_back(sensor.leftovers);
@@ -336,9 +336,9 @@ private:
     void write_answer(double t) {
         Tracks& tracks = now_.state.tracks;
         Answer& answer = now_.answer;
-        answer.takers.clear(), answer.nis.clear(), answer.noise_scale.clear();
+        answer.assigned.clear(), answer.nis.clear(), answer.noise_scale.clear();
         for (const Scan& scan : scans_) {
-            answer.takers.insert(answer.takers.end(), scan.takers.begin(), scan.takers.end());
+            answer.assigned.insert(answer.assigned.end(), scan.assigned.begin(), scan.assigned.end());
             answer.nis.insert(answer.nis.end(), scan.nis.begin(), scan.nis.end());
             answer.noise_scale.insert(answer.noise_scale.end(), scan.boxes.size(), scan.noise_scale);
         }
@@ -400,9 +400,9 @@ void bind(nb::module_& module) {
         .def("scans", [](const Record& record, const Model& model) { return scans_of(record, model.constants()); },
              nb::arg("model"),
              "Scan by scan, in the order they were taken in: index of the sensor (K,), number of tracks after it (K,),\n"
-             "and of those among them that had been born before (K,); of these, one scan after the other, the transition (E, 49) from the record before, both axes alike, and mean\n"
+             "and of those among them that had been born before (K,); of these, one scan after the other, the transition (E, 49) from the record before, both axes in one, and mean\n"
              "(E, 14) and covariance (E, 98) before the update, and after it.")
-        .def("told", &told_of,
+        .def("fields", &fields_of,
              "Time (s), whether all tracks had ended before; of the tracks (N,) their posterior, the sensors that found\n"
              "them, whether one of these confirms that they are there, the detections missed since, and whether they live on.")
         .def("gaps", [](const Record& record) { return gaps_of(record.gaps); },
@@ -422,13 +422,13 @@ void bind(nb::module_& module) {
              "infinite for whole tracks, negative for none.")
         .def("declare_sensor", exclusive(&Model::declare_sensor),
              nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(),
-             "Add a sensor that has not looked yet. even_logit: of the score at which a box is as likely real as not,\n"
+             "Add a sensor that has had no scan yet. even_logit: of the score at which a box is as likely real as not,\n"
              "NaN where it is to be learnt.")
         .def("take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
-             nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("alike").noconvert() = nb::none(),
+             nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("similarity").noconvert() = nb::none(),
              nb::arg("motion").noconvert() = nb::none(), nb::arg("owners").noconvert() = nb::none(),
              "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
-             "top, right, bottom (px), logits of their scores (M,); alike (N, M): how much more likely each box is of a\n"
+             "top, right, bottom (px), logits of their scores (M,); similarity (N, M): how much more likely each box is of a\n"
              "living track than of another by what both look like, as ln of the ratio; motion (11,): of the camera since\n"
              "its picture before, see jeat_graph.filters.picture_motion.PictureMotion; owners (M, 3): whose each box is,\n"
              "where that is given, below 0 for nobody's, at most one box of a scan each, and 1 where more of its owner's are\n"
@@ -440,7 +440,7 @@ void bind(nb::module_& module) {
              nb::arg("share").noconvert() = nb::none(),
              "Tell the smoother of a step (of the last one without a record), in order of time: the identity given out\n"
              "for each of its tracks (N,), the number of its class, below 0 for none, and the share of its votes.")
-        .def("begin_anew", exclusive(&Model::begin_anew), nb::arg("t"),
+        .def("reset", exclusive(&Model::reset), nb::arg("t"),
              "End all tracks and go on from another time (s), as if none had passed; what was learnt stays.")
         .def("snapshot", exclusive(&Model::snapshot), "A copy of all that the next step depends on.")
         .def("restore", exclusive(&Model::restore), nb::arg("moment"), "Go back to a snapshot of this model.")
@@ -458,14 +458,14 @@ void bind(nb::module_& module) {
         .def("sensors", exclusive(&Model::sensors), "Number of sensors.")
         .def("time", exclusive(&Model::time), "Time of the last step (s); None before the first.")
         .def("picture", exclusive(&Model::picture), "Width and height of the picture (px), as far as is known.")
-        .def("last_looks", exclusive(&Model::last_looks), "When each sensor looked last (s), NaN for never.")
+        .def("last_scans", exclusive(&Model::last_scans), "Time of each sensor's last scan (s), NaN before it.")
         .def("__deepcopy__", [](Model& model, const nb::object&) {
                  const Exclusive::Hold hold(model.use);
                  return new Model(model);
              },
              nb::arg("memo"), "A model of its own in the same state.")
         .def("waiting", exclusive(&Model::waiting), "Number of smoothed rows that have become final.")
-        .def("takers", exclusive(&Model::takers), "Identity of the track that took each box of the last step (M,).")
+        .def("assigned", exclusive(&Model::assigned), "Identity of the track that each box of the last step was assigned to (M,).")
         .def("living", exclusive(&Model::living), "Identities of the tracks of the last step, before any ended (N,).")
         .def("size", exclusive(&Model::size), "Number of living tracks.")
         .def("born", exclusive(&Model::born), "Number of tracks started so far.")

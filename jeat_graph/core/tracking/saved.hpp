@@ -25,7 +25,7 @@ using smoothers::Rows;
 struct Answer {
     Rows rows;                                 // of the tracks that are reported
     std::vector<double> mean, covariance;      // states of these
-    std::vector<std::int64_t> takers, living;  // of all boxes; the tracks before any ended
+    std::vector<std::int64_t> assigned, living;  // of all boxes; the tracks before any ended
     std::vector<double> real;                  // posteriors of these
     std::vector<double> nis, noise_scale;      // of all boxes
 };
@@ -142,13 +142,13 @@ void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_
 }
 
 template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix, Sensor& sensor) {
-    auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_look_s, repetition, even_logit] = sensor;
+    auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_scan_s, repetition, even_logit] = sensor;
     v.numbers(prefix + "leftovers", &leftovers, 1);
     v.numbers(prefix + "false_boxes", &false_boxes, 1);
     v.numbers(prefix + "boxes_at_edge", &boxes_at_edge, 1);
     v.numbers(prefix + "boxes_beyond", &boxes_beyond, 1);
     v.numbers(prefix + "period_s", &period_s, 1, Values::any);
-    v.numbers(prefix + "last_look_s", &last_look_s, 1, Values::any);
+    v.numbers(prefix + "last_scan_s", &last_scan_s, 1, Values::any);
     v.numbers(prefix + "even_logit", &even_logit, 1, Values::any);
     auto& [boxes, repeated, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
     std::size_t rows = last_boxes.size();
@@ -199,7 +199,7 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     auto& [gaps_ended, ended_well] = gaps;
     v.numbers("gaps.ended", gaps_ended.data(), gaps_ended.size());
     v.numbers("gaps.ended_well", ended_well.data(), ended_well.size());
-    auto& [p_detect, unseen, stationary_unseen, indifference, prior_odds, agreed_mean, agreed_std, agreed_share, noise_share] =
+    auto& [p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share, noise_share] =
         belief;
     v.column("belief.agreed_mean", agreed_mean, S, 1);
     v.column("belief.agreed_std", agreed_std, S, 1);
@@ -207,7 +207,7 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     v.column("belief.p_detect", p_detect, S, 1);
     v.column("belief.unseen", unseen, S, 1);
     v.column("belief.stationary_unseen", stationary_unseen, S, 1);
-    v.column("belief.indifference", indifference, S, 1);
+    v.column("belief.decision_threshold", decision_threshold, S, 1);
     v.column("belief.prior_odds", prior_odds, S, 1);
     v.numbers("belief.noise_share", &noise_share, 1);
     auto& [offset_sensors, weight, total] = offsets;
@@ -233,14 +233,14 @@ template <class Visitor> void visit_rows(Visitor& v, const std::string& prefix, 
 }
 
 template <class Visitor> void visit_answer(Visitor& v, Answer& answer) {
-    auto& [rows, mean, covariance, takers, living, real, nis, noise_scale] = answer;
+    auto& [rows, mean, covariance, assigned, living, real, nis, noise_scale] = answer;
     visit_rows(v, "answer.", rows);
-    std::size_t boxes = takers.size(), tracks = living.size();
+    std::size_t boxes = assigned.size(), tracks = living.size();
     v.whole("answer.boxes", boxes);
     v.whole("answer.tracks", tracks);
     v.column("answer.state", mean, rows.size(), kMean);
     v.column("answer.covariance", covariance, rows.size(), kCovariance);
-    v.column("answer.takers", takers, boxes, 1);
+    v.column("answer.assigned", assigned, boxes, 1);
     v.column("answer.living", living, tracks, 1);
     v.column("answer.real_of_living", real, tracks, 1);
     v.column("answer.nis", nis, boxes, 1, Values::any);

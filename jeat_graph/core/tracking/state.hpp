@@ -83,10 +83,10 @@ struct Tracks {
 struct Sensor {
     double leftovers;                                             // count_clutter
     double false_boxes = 0.0;                                     // count_false_boxes
-    double boxes_at_edge = 0.0, boxes_beyond = 0.0;               // look
-    double period_s = std::numeric_limits<double>::quiet_NaN();   // look
-    double last_look_s = std::numeric_limits<double>::quiet_NaN();
-    RepeatCounts repetition;                                      // look
+    double boxes_at_edge = 0.0, boxes_beyond = 0.0;               // begin_scan
+    double period_s = std::numeric_limits<double>::quiet_NaN();   // begin_scan
+    double last_scan_s = std::numeric_limits<double>::quiet_NaN();
+    RepeatCounts repetition;                                      // begin_scan
     // What the user says of it: the logit of the score at which a box is as likely real as not, NaN where it is to
     // be learnt.
     double even_logit = std::numeric_limits<double>::quiet_NaN();
@@ -98,7 +98,7 @@ struct State {
     double t = 0.0;                 // predict
     bool started = false;
     std::int64_t next_id = 1;       // begin_tracks
-    double width = 1.0, height = 1.0;  // look, where the picture is not known
+    double width = 1.0, height = 1.0;  // begin_scan, where the picture is not known
     bool picture_known = false;
     ProcessNoise process_noise;     // learn_noise
     CameraVariance camera;          // follow_camera
@@ -123,7 +123,7 @@ struct State {
     double log_scene_variance() const {
         double sum = 0.0, number = 0.0;
         for (std::size_t k = 0; k < sensors.size(); ++k)
-            if (!std::isnan(sensors[k].last_look_s)) sum += log_side_variance[k], number += 1.0;
+            if (!std::isnan(sensors[k].last_scan_s)) sum += log_side_variance[k], number += 1.0;
         return sum / std::max(number, 1.0);
     }
 

@@ -139,8 +139,8 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
     for (const double count : {sensor.leftovers, sensor.false_boxes, sensor.boxes_at_edge, sensor.boxes_beyond})
         check_between(name + "counts", count, 0.0, kMostCount);
     require(!(sensor.period_s < 0.0) && !std::isinf(sensor.period_s), name + "period_s", "is no time");
-    require(!std::isinf(sensor.last_look_s), name + "last_look_s", "is no time");
-    check_past(name + "last_look_s", sensor.last_look_s, now);
+    require(!std::isinf(sensor.last_scan_s), name + "last_scan_s", "is no time");
+    check_past(name + "last_scan_s", sensor.last_scan_s, now);
     require(!(std::abs(sensor.even_logit) > kMostLogVariance), name + "even_logit", "is of no score");
     const RepeatCounts& counts = sensor.repetition;
     for (int bin = 0; bin < kScoreBins; ++bin) {
@@ -165,7 +165,7 @@ inline void check_belief(const State& state) {
     check_between("belief.agreed_share", belief.agreed_share, 0.0, 1.0);
     check_between("belief.agreed_std", belief.agreed_std, 0.0, kMostLogVariance);
     for (const double std : belief.agreed_std) require(std > 0.0, "belief.agreed_std", "is none");
-    check_between("belief.indifference", belief.indifference, -kMostLogVariance, kMostLogVariance);
+    check_between("belief.decision_threshold", belief.decision_threshold, -kMostLogVariance, kMostLogVariance);
     check_between("belief.prior_odds", belief.prior_odds, -kMostLogVariance, kMostLogVariance);
     check_between("log_side_variance", state.log_side_variance, -kMostLogVariance, kMostLogVariance);
     const ProcessNoise& q = state.process_noise;
@@ -206,8 +206,8 @@ inline void check_state(const State& state, const Answer& answer) {
     check_identities("answer.living", answer.living, state.next_id);
     check_motion("answer", answer.mean, answer.covariance);
     check_between("answer.real", answer.real, 0.0, 1.0);
-    for (const std::int64_t taker : answer.takers)
-        require(taker >= 0 && taker < state.next_id, "answer.takers", "are no tracks");
+    for (const std::int64_t id : answer.assigned)
+        require(id >= 0 && id < state.next_id, "answer.assigned", "are no tracks");
 }
 
 inline void check_rows(const std::string& name, const Rows& rows, const State& state) {

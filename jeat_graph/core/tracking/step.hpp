@@ -25,19 +25,19 @@ inline constexpr double kLongestAgoS = 1e9;
 
 using smoothers::Record;
 
-// One look of a sensor.
+// One scan of a sensor.
 struct Scan {
     std::size_t sensor = 0;
     std::vector<Sides> boxes;
     std::vector<double> logits;
-    // How much more likely each box is of a track than of another by its looks: ln ratio, (tracks, boxes).
-    View2<const double> alike{nullptr, 0, 0};
+    // How much more likely each box is of a track than of another by its appearance: ln ratio, (tracks, boxes).
+    View2<const double> similarity{nullptr, 0, 0};
     // Where who is who is given: whose each box is, below 0 for nobody's, and whether later ones are the same one's.
     // Empty where the tracker decides. At most one box of a scan has the same owner.
     std::vector<std::int64_t> owners;
     std::vector<std::uint8_t> awaited;
     std::vector<double> later;         // posteriors by what comes later, to the smoother
-    std::vector<std::int64_t> takers;  // written: the track that each box went to
+    std::vector<std::int64_t> assigned;  // written: the track that each box went to
     std::vector<double> nis;           // written: squared distance of its centre, NaN where it began a track
     double noise_scale = 1.0;          // written: variance of the sensor's sides, 1 before anything was learnt
 };
@@ -54,7 +54,7 @@ public:
         step_s_ = s_.started ? s_.t : t;
         for (const std::size_t place : order_of(scans)) {
             Scan& scan = scans[place];
-            const ScanClock clock = look(t, scan);
+            const ScanClock clock = begin_scan(t, scan);
             if (record) write_growth(*record);
             predict(t);
             correct_boxes(scan);
@@ -112,14 +112,14 @@ public:
     }
 
     // End all tracks and go on from another time, as if none had passed; what was learnt stays.
-    void begin_anew(double t) {
+    void reset(double t) {
         Tracks& tracks = s_.tracks;
         end(std::vector<std::uint8_t>(tracks.size(), 1), std::vector<std::uint8_t>(tracks.size(), 0));
         if (!s_.started) return;
         for (Sensor& sensor : s_.sensors) {
-            // It has not looked again since: not for less than the time between two of its scans.
+            // It has had no scan since: not for less than the time between two of its scans.
             const double period = std::isnan(sensor.period_s) ? c_.first_period_s : sensor.period_s;
-            sensor.last_look_s = t - clamp(s_.t - sensor.last_look_s, period, kLongestAgoS);
+            sensor.last_scan_s = t - clamp(s_.t - sensor.last_scan_s, period, kLongestAgoS);
         }
         s_.learnt_s = t - clamp(s_.t - s_.learnt_s, 0.0, kLongestAgoS);
         s_.t = t;
@@ -157,7 +157,7 @@ private:
         return order;
     }
 
-    ScanClock look(double t, const Scan& scan) {
+    ScanClock begin_scan(double t, const Scan& scan) {
         Sensor& sensor = s_.sensors[scan.sensor];
         if (!s_.picture_known) {
             for (const Sides& box : scan.boxes) {
@@ -165,13 +165,13 @@ private:
                 s_.height = std::max(s_.height, box.bottom);
             }
         }
-        if (!std::isnan(sensor.last_look_s)) {
-            const double since = t - sensor.last_look_s;
+        if (!std::isnan(sensor.last_scan_s)) {
+            const double since = t - sensor.last_scan_s;
             sensor.period_s = std::isnan(sensor.period_s)
                                   ? since
                                   : kPeriodMemory * sensor.period_s + (1.0 - kPeriodMemory) * since;
         }
-        sensor.last_look_s = t;
+        sensor.last_scan_s = t;
         if (s_.picture_known)
             for (const Sides& box : scan.boxes) {
                 const double out = std::max(std::max(-box.left, -box.top), std::max(box.right - s_.width, box.bottom - s_.height));
@@ -179,8 +179,8 @@ private:
                 sensor.boxes_at_edge += edges_of(box, s_.width, s_.height, c_).any();
             }
         sensor.repetition.count(scan.boxes, scan.logits, c_);
-        s_.belief.indifference[scan.sensor] =
-            std::isnan(sensor.even_logit) ? sensor.repetition.indifference(c_) : -sensor.even_logit;
+        s_.belief.decision_threshold[scan.sensor] =
+            std::isnan(sensor.even_logit) ? sensor.repetition.decision_threshold(c_) : sensor.even_logit;
         const double period = std::isnan(sensor.period_s) ? c_.first_period_s : sensor.period_s;
         return {t, period, c_};
     }
@@ -286,7 +286,7 @@ private:
         q_.resize(boxes_.size());
         of_clutter_.resize(boxes_.size());
         for (std::size_t j = 0; j < boxes_.size(); ++j) {
-            q_[j] = expit(s_.belief.indifference[k] + scan.logits[j]);
+            q_[j] = expit(scan.logits[j] - s_.belief.decision_threshold[k]);
             of_clutter_[j] = association::score_likelihood(c_.clutter_precision, q_[j], c_);
         }
         const association::ScanTerms terms(s_.sensors[k].leftovers, s_.width * s_.height, c_);
@@ -307,7 +307,7 @@ private:
             const double above = association::reach(expected, 1, c_);
             const auto gain_of = [&](std::size_t j) {
                 const auto y = side_innovations(boxes_[j], expected.box);
-                const Edges cut = unmeasured(y, edges_[j]);
+                const Edges cut = unmeasured_sides(y, edges_[j]);
                 const double density =
                     association::sides_log_density(y, cut.any() ? with_cut(expected, cut, c_) : expected, terms, c_);
                 if (density <= association::kImpossible) return density;
@@ -326,7 +326,7 @@ private:
                 if (gain > 0.0) pairs_.push_back({i, j, gain});
             });
         }
-        made_ = assignment_.solve(by_looks(scan), n, boxes_.size(), c_.exact_assignment);
+        made_ = assignment_.solve(by_appearance(scan), n, boxes_.size(), c_.exact_assignment);
     }
 
     // The boxes of a scan by their owners, where these are given.
@@ -357,14 +357,14 @@ private:
         }
     }
 
-    // The pairs with what their looks say. That tells who takes a box, and not whether there is an object.
-    const std::vector<association::Pair>& by_looks(const Scan& scan) {
-        if (!scan.alike.data) return pairs_;
-        alike_ = pairs_;
-        for (association::Pair& pair : alike_)
-            if (pair.row < scan.alike.rows)
-                pair.gain = std::max(pair.gain + scan.alike[pair.row][pair.column], association::kLeastGain);
-        return alike_;
+    // The pairs with the similarity of their appearance, which decides the assignment, not whether there is an object.
+    const std::vector<association::Pair>& by_appearance(const Scan& scan) {
+        if (!scan.similarity.data) return pairs_;
+        with_appearance_ = pairs_;
+        for (association::Pair& pair : with_appearance_)
+            if (pair.row < scan.similarity.rows)
+                pair.gain = std::max(pair.gain + scan.similarity[pair.row][pair.column], association::kLeastGain);
+        return with_appearance_;
     }
 
     void count_gaps() {
@@ -403,7 +403,7 @@ private:
         smoothers::Entry* const entries = record ? record->last_scan() : nullptr;
         for (std::size_t m = 0; m < made_.size(); ++m) {
             const std::size_t i = pairs_[made_[m]].row;
-            const Edges cut = unmeasured(innovations_[m], edges_[pairs_[made_[m]].column]);
+            const Edges cut = unmeasured_sides(innovations_[m], edges_[pairs_[made_[m]].column]);
             const SidesExpected expected = cut.any() ? with_cut(expected_[i], cut, c_) : expected_[i];
             std::array<double, 4> left_over = innovations_[m];
             // To the smoother a side that shows again is part of the prediction: the states before did not know of it.
@@ -498,8 +498,8 @@ private:
             const association::Pair& pair = pairs_[made_[m]];
             scan.nis[pair.column] = centre_distance(innovations_[m], expected_[pair.row]);
         }
-        scan.takers.resize(boxes_.size());
-        for (std::size_t j = 0; j < boxes_.size(); ++j) scan.takers[j] = tracks.track_id[taken_by_[j]];
+        scan.assigned.resize(boxes_.size());
+        for (std::size_t j = 0; j < boxes_.size(); ++j) scan.assigned[j] = tracks.track_id[taken_by_[j]];
     }
 
     void compare_sensors(const Scan& scan) {
@@ -563,8 +563,8 @@ private:
         const Tracks& tracks = s_.tracks;
         for (const Scan& scan : scans) {
             double found = 0.0;
-            for (const std::int64_t taker : scan.takers) {
-                const auto place = std::lower_bound(tracks.track_id.begin(), tracks.track_id.end(), taker);
+            for (const std::int64_t id : scan.assigned) {
+                const auto place = std::lower_bound(tracks.track_id.begin(), tracks.track_id.end(), id);
                 found += 1.0 - tracks.real[static_cast<std::size_t>(place - tracks.track_id.begin())];
             }
             double& mean = s_.sensors[scan.sensor].false_boxes;
@@ -645,7 +645,7 @@ private:
     Discretised step_{};
     PresenceTransition presence_step_{};
     association::Assignment assignment_;
-    std::vector<association::Pair> pairs_, alike_;
+    std::vector<association::Pair> pairs_, with_appearance_;
     std::vector<std::size_t> made_, free_, taken_by_, pair_of_;
     std::vector<SidesExpected> expected_;
     std::vector<double> p_detect_, q_, of_clutter_;

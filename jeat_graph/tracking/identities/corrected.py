@@ -46,14 +46,14 @@ def along_corrected(
     """
     detections, causal = log.recording()
     names, code, owner = match(detections, rows)
-    first = Trajectories.concatenate(list(_along(detections, owner, causal.takers, _at_scans(tracker))))
+    first = Trajectories.concatenate(list(_along(detections, owner, causal.assigned, _at_scans(tracker))))
     found = compare(rows, code, first, detections, owner, _noise(tracker))
-    takers = causal.takers
+    assigned = causal.assigned
     if len(found.moved) or len(found.added):
         detections, owner, origin = edited(detections, owner, rows, code, found)
-        takers = np.where(origin >= 0, np.append(takers, 0)[origin], 0)
-    smoothed = _along(detections, owner, takers, tracker)
-    return found.said, (replace(one, track_id=names[one.track_id - 1]) for one in smoothed)
+        assigned = np.where(origin >= 0, np.append(assigned, 0)[origin], 0)
+    smoothed = _along(detections, owner, assigned, tracker)
+    return found.disagreements, (replace(one, track_id=names[one.track_id - 1]) for one in smoothed)
 
 
 def match(detections: Detections, rows: CorrectedTracks) -> tuple[IntArray, IntArray, IntArray]:
@@ -87,14 +87,14 @@ def _along(
 ) -> Iterator[Trajectories]:
     decision = IdentityDecision.without_links(owner, causal)
     # A person says that there is an object; of what is nobody's nothing later is known.
-    return retrack(detections, decision, np.where(owner > 0, 1.0, -1.0), like, anew=True)
+    return retrack(detections, decision, np.where(owner > 0, 1.0, -1.0), like, from_scratch=True)
 
 
 def _at_scans(tracker: ModelTracker) -> ModelTracker:
     """Return a tracker like another one, whose smoothed rows are at the scans and not clipped."""
     smoother = replace(tracker.config.smoother, output_rate_hz=0.0)
     output = replace(tracker.config.output, clip=False, min_existence=0.0)
-    made = tracker.anew()
+    made = tracker.fresh_copy()
     made.config = replace(tracker.config, smoother=smoother, output=output)
     return made
 

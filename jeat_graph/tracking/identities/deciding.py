@@ -50,12 +50,12 @@ class Recording(NamedTuple):
 
     Attributes:
         measured: the detections.
-        looked: (T,) all times at which a sensor looked (s).
+        scan_t: (T,) all times at which a sensor looked (s).
         scene: what was learnt of the scene.
     """
 
     measured: MeasuredBoxes
-    looked: FloatArray
+    scan_t: FloatArray
     scene: LearntScene
 
 
@@ -104,19 +104,19 @@ def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelCon
         backward: that of them with the same constants backward in time.
         c: constants.
     """
-    seen, causal = recording.measured, passes[0].takers
-    takers = np.stack([one.takers for one in passes])
-    piece = agreement.pieces(agreement.SeenBoxes(seen.t, seen.sensor), takers, AGREED)
+    seen, causal = recording.measured, passes[0].assigned
+    assigned = np.stack([one.assigned for one in passes])
+    piece = agreement.pieces(agreement.SeenBoxes(seen.t, seen.sensor), assigned, AGREED)
     odds = np.full(int(piece.max(initial=-1)) + 1, -np.inf)
     np.maximum.at(odds, piece, 0.5 * (_log_odds(passes[0].real) + _log_odds(backward.real)))
-    told = (odds > LEAST_LOG_ODDS) & (np.bincount(piece, minlength=len(odds)) >= LEAST_DETECTIONS)
+    decided = (odds > LEAST_LOG_ODDS) & (np.bincount(piece, minlength=len(odds)) >= LEAST_DETECTIONS)
     number = np.full(len(odds), -1)
-    number[told] = np.arange(told.sum())
+    number[decided] = np.arange(decided.sum())
     piece = number[piece] if len(piece) else piece
     if not (piece >= 0).any():
         return IdentityDecision.without_links(np.zeros_like(causal), causal)
     members = _members(piece)
-    found, causal_cover = _joined(recording, members, piece, takers, c)
+    found, causal_cover = _joined(recording, members, piece, assigned, c)
     cover = preferring(found.links, found.cover, causal_cover, TIE)
     chain = chains(found.links, cover)
     owner = np.zeros(len(causal), dtype=np.int64)
@@ -136,7 +136,7 @@ def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelCon
 
 
 def _joined(
-    recording: Recording, members: list[IntArray], piece: IntArray, takers: IntArray, c: ModelConstants
+    recording: Recording, members: list[IntArray], piece: IntArray, assigned: IntArray, c: ModelConstants
 ) -> tuple[Joined, IntArray]:
     """Return the best cover of pieces, and the one (P,) that the causal pass made."""
     seen, scene = recording.measured, recording.scene
@@ -144,7 +144,7 @@ def _joined(
     pieces = Pieces(
         seen.t[first], seen.t[last], *(_at_rim(seen.boxes[k], scene.picture) for k in (first, last))
     )
-    made = agreement.votes_between(piece, takers[:1], first)[:2]
+    made = agreement.votes_between(piece, assigned[:1], first)[:2]
     tail, head = _with_causal(_candidates(seen, first, last), made, seen.t[first], seen.t[last])
     ends = ends_of(seen, _columns(members, from_end=True), scene, c)
     begun = beginnings_of(seen, _columns(members, from_end=False), scene, c)
@@ -153,11 +153,11 @@ def _joined(
     links = links._replace(gain=np.where(causal, np.maximum(links.gain, _LEAST_CAUSAL), links.gain))
     possible = causal | (links.gain > _LEAST_RATIO)
     links, causal = links.where(possible), causal[possible]
-    voted = agreement.votes_between(piece, takers, first)
-    votes = _of_pairs(links, *voted, len(members)) / len(takers)
-    looked = recording.looked
-    step = float(np.median(np.diff(looked))) if len(looked) > 1 else c.first_period_s
-    found = join(pieces, links, votes, (float(looked[0]), float(looked[-1])), step)
+    voted = agreement.votes_between(piece, assigned, first)
+    votes = _of_pairs(links, *voted, len(members)) / len(assigned)
+    scan_t = recording.scan_t
+    step = float(np.median(np.diff(scan_t))) if len(scan_t) > 1 else c.first_period_s
+    found = join(pieces, links, votes, (float(scan_t[0]), float(scan_t[-1])), step)
     return found, _only_links(links, causal, len(members))
 
 

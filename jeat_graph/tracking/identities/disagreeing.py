@@ -64,11 +64,11 @@ class RowsCompared(NamedTuple):
     """What came of a comparison.
 
     Attributes:
-        said: the disagreements.
+        disagreements: the disagreements.
         moved, added: (K,) rows that are to be detections, in a detection's place and beside all.
     """
 
-    said: Disagreements
+    disagreements: Disagreements
     moved: IntArray
     added: IntArray
 
@@ -94,18 +94,18 @@ def compare(
     sigma = _sigma(rows, code, smoothed, noise)
     off_by, has = _from_detections(rows, code, detections, owner, noise)
     # Of two rows that are as far from a scan neither is at it.
-    looked = np.abs(_instants(rows, detections) - rows.t) < _reach(rows) * (1.0 - 1e-9)
+    scanned = np.abs(_instants(rows, detections) - rows.t) < _reach(rows) * (1.0 - 1e-9)
     none, beyond = np.isnan(sigma), sigma > MOST_SIGMA
     what = np.full(len(rows.t), "", dtype="U8")
     what[beyond & ~has] = "added"
     what[none & ~has & ~rows.coasts] = "added"
-    what[(what == "added") & ~looked] = "unseen"
+    what[(what == "added") & ~scanned] = "unseen"
     what[beyond & has] = np.where(off_by > MOST_SIGMA, "moved", "identity")[beyond & has]
     what[none & has] = "absent"
     order = np.lexsort((rows.track_id, rows.t))
     order = order[what[order] != ""]
-    said = Disagreements(rows.t[order], rows.track_id[order], sigma[order], what[order])
-    return RowsCompared(said, np.flatnonzero(what == "moved"), np.flatnonzero(what == "added"))
+    disagreements = Disagreements(rows.t[order], rows.track_id[order], sigma[order], what[order])
+    return RowsCompared(disagreements, np.flatnonzero(what == "moved"), np.flatnonzero(what == "added"))
 
 
 def edited(
@@ -131,9 +131,11 @@ def edited(
         new = np.array(more.get(k, []), dtype=np.int64)
         blank = np.zeros(len(new))
         classes = None if scan.classes is None else np.append(scan.classes, np.full(len(new), ""))
-        looks = scan.embeddings
-        if looks is not None:
-            looks = np.concatenate([looks, np.full((len(new), looks.shape[1]), np.nan, looks.dtype)])
+        embeddings = scan.embeddings
+        if embeddings is not None:
+            embeddings = np.concatenate(
+                [embeddings, np.full((len(new), embeddings.shape[1]), np.nan, embeddings.dtype)]
+            )
         scans.append(
             trusted_scan(
                 scan.t,
@@ -141,7 +143,7 @@ def edited(
                 np.concatenate([boxes[own], rows.boxes[new]]),
                 np.concatenate([scores[own], blank + _SCORE]),
                 classes,
-                looks,
+                embeddings,
                 scan.camera_motion,
             )
         )
@@ -156,8 +158,8 @@ def _reach(rows: CorrectedTracks) -> float:
 
 def _instants(rows: CorrectedTracks, detections: Detections) -> FloatArray:
     """Return the time (R,) of the scan nearest to each row (s)."""
-    looked = np.unique(detections.scan_t)
-    return np.asarray(looked[nearest(looked, rows.t)])
+    scanned = np.unique(detections.scan_t)
+    return np.asarray(scanned[nearest(scanned, rows.t)])
 
 
 def _sigma(rows: CorrectedTracks, code: IntArray, smoothed: Trajectories, noise: Noise) -> FloatArray:
@@ -193,10 +195,10 @@ def _from_detections(
     at = np.repeat(detections.scan_t, np.diff(detections.scan_start))
     instant = _instants(rows, detections)
     off, has = np.full(len(code), np.inf), np.zeros(len(code), dtype=bool)
-    looked = np.unique(detections.scan_t)
-    row_key = code * len(looked) + np.searchsorted(looked, instant)
+    scanned = np.unique(detections.scan_t)
+    row_key = code * len(scanned) + np.searchsorted(scanned, instant)
     mine = np.flatnonzero(owner > 0)
-    key = owner[mine] * len(looked) + np.searchsorted(looked, at[mine])
+    key = owner[mine] * len(scanned) + np.searchsorted(scanned, at[mine])
     order = np.argsort(key, kind="stable")
     low, high = (np.searchsorted(key[order], row_key, side=side) for side in ("left", "right"))
     for k in range(int((high - low).max(initial=0))):

@@ -36,7 +36,7 @@ class IdentityLog:
         if kept is not None:
             ends = np.cumsum([len(scan) for scan in batch])
             batch = [_where(scan, own) for scan, own in zip(batch, np.split(kept, ends[:-1]), strict=True)]
-            taken = Pass(taken.takers[kept], taken.real[kept])
+            taken = Pass(taken.assigned[kept], taken.real[kept])
         self._scans += batch
         self._passes.append(taken)
         if len(self._scans) >= _SCANS_PER_PART:
@@ -54,7 +54,7 @@ class IdentityLog:
     def state(self) -> dict[str, Any]:
         """Return what `from_state` takes, plain data and `Detections`."""
         detections, taken = self.recording()
-        return {"detections": detections, "takers": taken.takers, "real": taken.real}
+        return {"detections": detections, "assigned": taken.assigned, "real": taken.real}
 
     @classmethod
     def from_state(cls, state: dict[str, Any]) -> IdentityLog:
@@ -63,13 +63,13 @@ class IdentityLog:
         Raises:
             DataError: none gave it.
         """
-        log, taken = cls(), Pass(state["takers"], state["real"])
+        log, taken = cls(), Pass(state["assigned"], state["real"])
         # Made anew, so that scans are checked as those of a user.
         detections = Detections.from_scans(Scan(**vars(scan)) for scan in state["detections"].scans())
         shape = (len(detections),)
-        if taken.takers.shape != shape or taken.takers.dtype != np.int64 or taken.real.shape != shape:
+        if taken.assigned.shape != shape or taken.assigned.dtype != np.int64 or taken.real.shape != shape:
             raise DataError("is damaged: its detections are not those that tracks took")
-        if (taken.takers < 0).any() or not ((taken.real >= 0.0) & (taken.real <= 1.0)).all():
+        if (taken.assigned < 0).any() or not ((taken.real >= 0.0) & (taken.real <= 1.0)).all():
             raise DataError("is damaged: its detections were taken by no tracks")
         if detections.num_scans:
             log._parts = [(detections, taken)]
@@ -107,6 +107,6 @@ def _order_of(t: Any, names: Any) -> IntArray:
 
 
 def _joined(passes: Sequence[Pass], order: IntArray) -> Pass:
-    takers = np.concatenate([np.zeros(0, dtype=np.int64), *(one.takers for one in passes)])
+    assigned = np.concatenate([np.zeros(0, dtype=np.int64), *(one.assigned for one in passes)])
     real = np.concatenate([np.zeros(0), *(one.real for one in passes)])
-    return Pass(takers[order], real[order])
+    return Pass(assigned[order], real[order])

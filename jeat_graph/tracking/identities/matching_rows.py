@@ -60,7 +60,7 @@ def _at_scans(
     """Return where the tracks are at the scans: scan (L,), number of the track (L,) and box (L, 4)."""
     period = period_of(rows.t)
     file_t = np.unique(rows.t)
-    said = np.abs(file_t[nearest(file_t, scan_t)] - scan_t) <= SAME_S
+    present = np.abs(file_t[nearest(file_t, scan_t)] - scan_t) <= SAME_S
     found: list[tuple[IntArray, IntArray, FloatArray]] = []
     order = np.lexsort((rows.t, code))
     for own in np.split(order, np.flatnonzero(np.diff(code[order])) + 1):
@@ -73,7 +73,7 @@ def _at_scans(
         between = np.zeros(len(at), dtype=bool)
         if len(t) > 1:
             between = (at >= t[0]) & (at <= t[-1]) & (t[behind] - t[behind - 1] <= _BRIDGED * period)
-        there = np.where(said[scans], gap <= SAME_S, between | (gap <= period / 2))
+        there = np.where(present[scans], gap <= SAME_S, between | (gap <= period / 2))
         at, scans = at[there], scans[there]
         box = np.where(
             between[there, None],

@@ -20,21 +20,21 @@ class Pass(NamedTuple):
     """What one pass says of N detections, in their order.
 
     Attributes:
-        takers: (N,) which of its tracks took each.
+        assigned: (N,) which of its tracks took each.
         real: (N,) posterior of that track then.
     """
 
-    takers: IntArray
+    assigned: IntArray
     real: FloatArray
 
 
 def took(tracker: ModelTracker, number: int) -> Pass:
     """Return which tracks took the detections of a tracker's last step, and their posteriors."""
-    takers = tracker.takers(number)
+    assigned = tracker.assigned(number)
     living, real = tracker._model.living(), tracker._model.fit()[2]
-    out, found = np.zeros(number), takers > 0
-    out[found] = real[np.searchsorted(living, takers[found])]
-    return Pass(takers, out)
+    out, found = np.zeros(number), assigned > 0
+    out[found] = real[np.searchsorted(living, assigned[found])]
+    return Pass(assigned, out)
 
 
 def one_pass(
@@ -48,12 +48,12 @@ def one_pass(
         constants: of the model.
         backward: from the last scan to the first, as if time went backward.
     """
-    tracker = like.anew(smooths=False, constants=constants)
-    takers, real = np.zeros(len(detections), dtype=np.int64), np.zeros(len(detections))
+    tracker = like.fresh_copy(smooths=False, constants=constants)
+    assigned, real = np.zeros(len(detections), dtype=np.int64), np.zeros(len(detections))
     for rows, batch in steps(detections, backward=backward):
         tracker.take_in(batch)
-        takers[rows], real[rows] = took(tracker, rows.stop - rows.start)
-    return Pass(takers, real)
+        assigned[rows], real[rows] = took(tracker, rows.stop - rows.start)
+    return Pass(assigned, real)
 
 
 def steps(detections: Detections, *, backward: bool = False) -> Iterator[tuple[slice, list[Scan]]]:

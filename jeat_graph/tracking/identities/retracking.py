@@ -27,7 +27,7 @@ def retrack(
     later: FloatArray,
     like: ModelTracker,
     *,
-    anew: bool = False,
+    from_scratch: bool = False,
 ) -> Iterator[Trajectories]:
     """Track a recording along given identities; yield its smoothed rows as they become final.
 
@@ -39,13 +39,13 @@ def retrack(
         decision: who is who.
         later: (N,) posterior of an object at each detection by what comes after it.
         like: a tracker with the configuration and the constants.
-        anew: whether all tracks follow what was decided, as if each had changed.
+        from_scratch: whether all tracks follow what was decided, as if each had changed.
     """
     owner, t = decision.owner, np.repeat(detections.scan_t, np.diff(detections.scan_start))
-    changed = np.ones(len(owner), dtype=bool) if anew else changed_tracks(decision)
+    changed = np.ones(len(owner), dtype=bool) if from_scratch else changed_tracks(decision)
     above = max(int(owner.max(initial=0)), int(decision.causal.max(initial=0)))
-    along = [] if anew else [_Along(like, above, np.where(changed, 0, decision.causal))]
-    if anew or changed.any():
+    along = [] if from_scratch else [_Along(like, above, np.where(changed, 0, decision.causal))]
+    if from_scratch or changed.any():
         given = np.stack([np.where(owner > 0, owner, -1), _more_to_come(owner, t), later], axis=1)
         along.append(_Along(like, above, np.where(changed, owner, 0), given))
     done = 0
@@ -84,7 +84,7 @@ class _Along:
     def __init__(
         self, like: ModelTracker, above: int, named: IntArray, given: FloatArray | None = None
     ) -> None:
-        self._tracker, self._named, self._given = like.anew(), named, given
+        self._tracker, self._named, self._given = like.fresh_copy(), named, given
         self._above = above
         self._of_track = np.zeros(0, dtype=np.int64)
         self.of_hit = np.zeros_like(named)  # identity of the track that took each detection so far
@@ -96,9 +96,9 @@ class _Along:
         assert taken is not None, "there is a smoother"
         fresh = self._above + 1 + np.arange(len(self._of_track), tracker.num_born + 1)
         self._of_track = np.concatenate([self._of_track, fresh])
-        takers, named = tracker.takers(rows.stop - rows.start), self._named[rows]
-        self._of_track[takers[named > 0]] = named[named > 0]
-        self.of_hit[rows] = self._of_track[takers]
+        assigned, named = tracker.assigned(rows.stop - rows.start), self._named[rows]
+        self._of_track[assigned[named > 0]] = named[named > 0]
+        self.of_hit[rows] = self._of_track[assigned]
         tracker.hand_over(taken._replace(given=self._of_track[taken.ids]))
 
     def drain(self) -> Trajectories:

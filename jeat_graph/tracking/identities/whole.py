@@ -64,7 +64,7 @@ def _recording(tracker: ModelTracker, detections: Detections) -> Recording:
         raise lacking(model.name, "does not say what it has learnt of the scene")
     learnt, picture = model.learnt(), model.picture()
     count = np.diff(detections.scan_start)
-    numbers = np.array([tracker._looked.index(name) for name in detections.sensors], dtype=np.int64)
+    numbers = np.array([tracker._engine_sensors.index(name) for name in detections.sensors], dtype=np.int64)
     sensor = numbers[np.repeat(detections.scan_sensor, count)]
     boxes = np.concatenate(
         [detections.boxes[:, :2], detections.boxes[:, :2] + detections.boxes[:, 2:]], axis=1

@@ -15,7 +15,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.filters import gap_survival
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.histories import Existence, StepRecord
-from jeat_graph.smoothers.rows import TOLD, Called, ModelRows, RowOutput, rows_of
+from jeat_graph.smoothers.rows import REPORTED, Called, ModelRows, RowOutput, rows_of
 from jeat_graph.tracking.engine import Moment, Recorded, StepBoxes, StepInput, lacking
 from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.paper.kalman import predict
@@ -36,18 +36,18 @@ class PaperMoment(NamedTuple):
         next_id: identity of the next track to be born.
         tracks: the living tracks.
         sensors: the names of the sensors in the order in which they were declared.
-        last_look_s: when each looked last (s), NaN for never.
+        last_scan_s: time of each one's last scan (s), NaN before it.
         step_ids: (N,) the tracks of the last step, before any ended.
-        takers: (M,) which of them took each of its boxes.
+        assigned: (M,) which of them took each of its boxes.
     """
 
     t: float | None
     next_id: int
     tracks: PaperTracks
     sensors: tuple[str, ...]
-    last_look_s: FloatArray
+    last_scan_s: FloatArray
     step_ids: IntArray
-    takers: IntArray
+    assigned: IntArray
 
     def identities(self) -> IntArray:
         """Return the identities (N,) of the living tracks."""
@@ -69,56 +69,56 @@ class PaperModel(SmoothsRecords):
     can_save = False
     has_fit = False
     weighs = False
-    compares_looks = False
+    compares_appearance = False
     takes_owners = False
 
     def __init__(self, config: Config) -> None:
-        super().__init__(histories_of(config, _EXISTENCE, _TOLD))
+        super().__init__(histories_of(config, _EXISTENCE, _OUTPUT))
         self._settings: PaperConfig = config.paper
         none = np.zeros(0, dtype=np.int64)
         self._now = PaperMoment(None, 1, PaperTracks.none(0), (), np.zeros(0), none, none)
-        self._said: dict[str, SensorConfig] = {}
+        self._declared: dict[str, SensorConfig] = {}
         self._last: StepRecord | None = None
 
-    def declare_sensor(self, name: str, said: SensorConfig) -> None:
-        """Add a sensor that has not looked yet."""
-        self._said[name] = said
+    def declare_sensor(self, name: str, declared: SensorConfig) -> None:
+        """Add a sensor that has had no scan yet."""
+        self._declared[name] = declared
         now = self._now
         self._now = now._replace(
             sensors=(*now.sensors, name),
             tracks=now.tracks.with_sensors(len(now.sensors) + 1),
-            last_look_s=np.append(now.last_look_s, math.nan),
+            last_scan_s=np.append(now.last_scan_s, math.nan),
         )
 
-    def take(self, looked: StepInput) -> None:
+    def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time.
 
         Raises:
             JeatGraphError: who is who is given.
         """
-        if looked.owners is not None:
+        if inputs.owners is not None:
             raise lacking(self.name, "is not given who is who; tracker.engine=core is")
-        now, t = self._now, looked.t
+        now, t = self._now, inputs.t
         dt = 0.0 if now.t is None else t - now.t
-        done = step(now.tracks, t, dt, self._found(looked), now.next_id, self._settings)
-        last_look_s = now.last_look_s.copy()
-        last_look_s[looked.sensors] = t
+        done = step(now.tracks, t, dt, self._found(inputs), now.next_id, self._settings)
+        last_scan_s = now.last_scan_s.copy()
+        last_scan_s[inputs.sensors] = t
         every = done.every
         self._now = PaperMoment(
             t,
             now.next_id + done.births,
             every.take(done.kept),
             now.sensors,
-            last_look_s,
+            last_scan_s,
             every.track_id,
-            done.taker,
+            done.assigned,
         )
         real = every.confirmed.astype(np.float64)
         flags = real, every.used, every.used != 0, np.zeros(len(every)), done.kept
         gaps = gap_survival.no_gaps(), gap_survival.no_gaps()
         self._last = StepRecord(t, dt >= LONGEST_SILENCE_S, every.track_id, done.records, *flags, *gaps)
 
-    def begin_anew(self, t: float) -> None:
+    def reset(self, t: float) -> None:
         """End all tracks and go on from another time (s); what was learnt of them is gone."""
         now = self._now
         if now.t is None:
@@ -126,7 +126,7 @@ class PaperModel(SmoothsRecords):
         if self._histories is not None:
             self._histories.end_all()
         none = np.zeros(0, dtype=np.int64)
-        self._now = now._replace(t=t, tracks=now.tracks.take(none), step_ids=none, takers=none)
+        self._now = now._replace(t=t, tracks=now.tracks.take(none), step_ids=none, assigned=none)
 
     def number_on_from(self, identity: int) -> None:
         """Give no new track a smaller identity."""
@@ -162,9 +162,9 @@ class PaperModel(SmoothsRecords):
         """Return the identities (N,) of the tracks of the last step, before any ended."""
         return self._now.step_ids
 
-    def takers(self) -> IntArray:
+    def assigned(self) -> IntArray:
         """Return the identity of the track (M,) that took each box of the last step."""
-        return self._now.takers
+        return self._now.assigned
 
     def rows(self) -> ModelRows:
         """Return the confirmed tracks."""
@@ -175,9 +175,9 @@ class PaperModel(SmoothsRecords):
         dt = 0.0 if self._now.t is None else t - self._now.t
         return _rows(predict(self._reported(), dt, self._settings), t)
 
-    def last_looks(self) -> FloatArray:
-        """Return when each sensor (S,) looked last (s), NaN for never."""
-        return self._now.last_look_s
+    def last_scans(self) -> FloatArray:
+        """Return the time of each sensor's (S,) last scan (s), NaN before it."""
+        return self._now.last_scan_s
 
     def picture(self) -> tuple[float, float] | None:
         """Return nothing: the paper's method has no picture."""
@@ -197,7 +197,7 @@ class PaperModel(SmoothsRecords):
         """Refuse: there are no diagnostics."""
         raise lacking(self.name, "has no diagnostics")
 
-    def measurements(self, told: StepBoxes) -> RecordArray:
+    def measurements(self, measured: StepBoxes) -> RecordArray:
         """Refuse: there are no diagnostics."""
         raise lacking(self.name, "has no diagnostics")
 
@@ -227,35 +227,35 @@ class PaperModel(SmoothsRecords):
     def _reported(self) -> PaperTracks:
         return self._now.tracks.take(self._now.tracks.confirmed)
 
-    def _found(self, looked: StepInput) -> Found:
+    def _found(self, inputs: StepInput) -> Found:
         """Return the detections of a step with their noise R_base g(p), g = 1 / max(p, floor).
 
         Sensors are numbered as they were met; births are by their names, as in a configuration.
         """
-        sensor = np.repeat(looked.sensors, looked.numbers)
-        known = [self._said[name] for name in self._now.sensors]
+        sensor = np.repeat(inputs.sensors, inputs.numbers)
+        known = [self._declared[name] for name in self._now.sensors]
         variance: FloatArray = np.array([one.sigma_px**2 for one in known])
         size_variance: FloatArray = np.array([one.sigma_log_size**2 for one in known])
         by_name = np.argsort(np.argsort(self._now.sensors)) if known else np.zeros(0, dtype=np.int64)
-        size = looked.boxes[:, 2:]
+        size = inputs.boxes[:, 2:]
         return Found(
-            looked.boxes[:, :2] + 0.5 * size,
+            inputs.boxes[:, :2] + 0.5 * size,
             np.log(size),
             sensor,
-            variance[sensor] / np.maximum(looked.scores, self._settings.score_floor),
+            variance[sensor] / np.maximum(inputs.scores, self._settings.score_floor),
             size_variance[sensor],
             by_name[sensor],
         )
 
 
-def _told_mean(mean: FloatArray) -> FloatArray:
+def _reported_mean(mean: FloatArray) -> FloatArray:
     """Return states (..., 2, 5) as they are, sides of boxes bounded: e^l must not overflow."""
     out = mean.copy()
     out[..., 3] = np.minimum(out[..., 3], MOST_LOG_SIZE)
     return out
 
 
-_TOLD = RowOutput(_told_mean, lambda _, covariance: covariance)
+_OUTPUT = RowOutput(_reported_mean, lambda _, covariance: covariance)
 
 
 def _rows(tracks: PaperTracks, t: float | None) -> tuple[ModelRows, FloatArray]:
@@ -264,5 +264,5 @@ def _rows(tracks: PaperTracks, t: float | None) -> tuple[ModelRows, FloatArray]:
     states = together(tracks)
     when = np.full(n, 0.0 if t is None else t)
     called = [Called(track) for track in tracks.track_id.tolist()]
-    rows = rows_of(when, called, states, np.ones(n), tracks.used, _TOLD)
-    return rows, states[1].reshape(n, 2, TOLD, TOLD)
+    rows = rows_of(when, called, states, np.ones(n), tracks.used, _OUTPUT)
+    return rows, states[1].reshape(n, 2, REPORTED, REPORTED)

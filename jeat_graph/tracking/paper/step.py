@@ -25,14 +25,14 @@ class Stepped(NamedTuple):
         every: N tracks, those that end included; those born in the step are the last ones.
         births: how many of them.
         kept: (N,) which live on.
-        taker: (M,) identity of the track that each detection went to.
+        assigned: (M,) identity of the track that each detection went to.
         records: for the smoother, one for each round of updates.
     """
 
     every: PaperTracks
     births: int
     kept: BoolArray
-    taker: IntArray
+    assigned: IntArray
     records: list[FilterRecord]
 
 
@@ -52,11 +52,11 @@ def step(
     if dt >= LONGEST_SILENCE_S:
         tracks = tracks.take(np.zeros(0, dtype=np.int64))
     tracks = predict(tracks, dt, config)
-    taker = np.zeros(len(found), dtype=np.int64)
+    assigned = np.zeros(len(found), dtype=np.int64)
     rounds = [_Round(tracks, tracks, np.full(len(tracks), -1))]
 
     def take(row: IntArray, detection: IntArray) -> PaperTracks:
-        taker[detection] = tracks.track_id[row]
+        assigned[detection] = tracks.track_id[row]
         sensor = np.full(len(tracks), -1)
         sensor[row] = found.sensor[detection]
         after = update(tracks, row, found, detection, t, config)
@@ -70,26 +70,26 @@ def step(
         first = np.full(len(tracks), -1)
         first[row] = found.sensor[detection]
         tracks = take(row, detection)
-        for sensor in np.unique(found.sensor[taker == 0]):
+        for sensor in np.unique(found.sensor[assigned == 0]):
             pairs = gated_pairs(tracks, found, config.gate)
-            free = (taker[pairs.detection] == 0) & (found.sensor[pairs.detection] == sensor)
+            free = (assigned[pairs.detection] == 0) & (found.sensor[pairs.detection] == sensor)
             other = (first[pairs.row] >= 0) & (first[pairs.row] != sensor)
             again = second_views(pairs.take(free & other))
             if len(again[0]):
                 tracks = take(*again)
     tracks = confirm(tracks, t, config)
     alive = lives(tracks, t, config)
-    left = np.flatnonzero(taker == 0)
+    left = np.flatnonzero(assigned == 0)
     # Numbered by sensor, whichever scan of this time came first.
     left = left[np.argsort(found.place[left], kind="stable")]
     new = confirm(born(found, left, t, first_id, tracks.scale.shape[1], config), t, config)
-    taker[left] = new.track_id
+    assigned[left] = new.track_id
     kept = np.concatenate([np.isin(np.arange(len(tracks)), alive), np.ones(len(left), dtype=np.bool_)])
     every = tracks.join(new)
     F = transition(dt)
     records = [_record(one, F if k == 0 else np.eye(len(F))) for k, one in enumerate(rounds)]
     records[-1] = _with_births(records[-1], new, found.sensor[left])
-    return Stepped(every, len(left), kept, taker, records)
+    return Stepped(every, len(left), kept, assigned, records)
 
 
 class _Round(NamedTuple):
