@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -37,6 +36,7 @@ from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import diagnostics_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
 from jeat_graph.tracking.model_tables import ClassNames, Places, table_of, with_classes
+from jeat_graph.tracking.old_names import OldNames
 from jeat_graph.tracking.one_at_a_time import OneAtATime, one_at_a_time
 from jeat_graph.tracking.pending_step import PendingStep
 from jeat_graph.tracking.prediction import Prediction, of_motion, still_there, time_from
@@ -66,7 +66,7 @@ def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
     "rows_below_least predict last_updates last_measurements smoothed drain_smoothed settle finish "
     "finish_in_pieces follow disagreements identity_links state hypotheses learnt sensor_states"
 )
-class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
+class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
     """An engine as a tracker.
 
     Sensors have any names and are known from their first scan on. Boxes are reported up to the edge of the
@@ -307,16 +307,6 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OneAtATime):
     def number_on_from(self, identity: int) -> None:
         """Give no track that begins from now on an identity below this."""
         self._model.number_on_from(identity)
-
-    def begin_anew(self, t: float) -> None:
-        """Old name of `reset`."""
-        warnings.warn("begin_anew is now called reset", DeprecationWarning, stacklevel=2)
-        self.reset(t)
-
-    def takers(self, count: int) -> IntArray:
-        """Old name of `assigned`."""
-        warnings.warn("takers is now called assigned", DeprecationWarning, stacklevel=2)
-        return self.assigned(count)
 
     def assigned(self, count: int) -> IntArray:
         """Return which track took each of the `count` detections (M,) of the last step, 0 where none did."""
