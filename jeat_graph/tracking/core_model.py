@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -53,12 +53,11 @@ class CoreModel(OneModel):
 
     def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time."""
-        sides = np.concatenate([inputs.boxes[:, :2], inputs.boxes[:, :2] + inputs.boxes[:, 2:]], axis=1)
         similarity = None if inputs.similarity is None else np.ascontiguousarray(inputs.similarity)
         owners = None if inputs.owners is None else np.ascontiguousarray(inputs.owners)
-        logits = logit(inputs.scores)
+        boxes, logits = np.ascontiguousarray(inputs.boxes), logit(inputs.scores)
         self._model.take(
-            inputs.t, inputs.sensors, inputs.numbers, sides, logits, similarity, inputs.motion, owners
+            inputs.t, inputs.sensors, inputs.numbers, boxes, logits, similarity, inputs.motion, owners
         )
 
     def reset(self, t: float) -> None:
@@ -106,6 +105,10 @@ class CoreModel(OneModel):
     def rows(self) -> ModelRows:
         """Return the tracks that the last step reports."""
         return self._model.rows()
+
+    def reported(self) -> Callable[[], ModelRows]:
+        """Return a function that gives these rows, after later steps too."""
+        return self._model.reported().columns
 
     def states(self) -> tuple[FloatArray, FloatArray]:
         """Return their means (N, 14) and covariances (N, 98)."""

@@ -7,7 +7,7 @@ method) fulfil it, and `engines.make_engine` chooses one. What an engine does no
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -158,6 +158,9 @@ class TrackEngine(Protocol):
 
     def rows(self) -> ModelRows:
         """Return the tracks that the last step reports."""
+
+    def reported(self) -> Callable[[], ModelRows]:
+        """Return a function that gives these rows, after later steps too."""
 
     def predicted(self, t: float) -> tuple[ModelRows, FloatArray]:
         """Return these tracks at a later time (s), and the covariances (N, 2, 5, 5) of what is told."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -30,26 +30,33 @@ class ClassNames(NamedTuple):
     numbers: dict[str, int]
 
 
-def table_of(
-    rows: ModelRows,
-    sensors: tuple[str, ...],
-    places: Places,
-    called: ClassNames | None,
-    instants: FloatArray | None = None,
-    clip: tuple[float, float] | None = None,
-    least: float = 0.0,
-) -> Trajectories:
-    """Return rows as a table.
+class TableForm(NamedTuple):
+    """What a table says beside its rows.
+
+    Attributes:
+        sensors: names of its sensors.
+        places: where the model's sensors stand among these.
+        called: the classes; None for a table without any.
+        clip: width and height of the picture (px) at whose edge boxes end; None where they do not.
+        least: probability of existence below which a row is left out.
+    """
+
+    sensors: tuple[str, ...]
+    places: Places
+    called: ClassNames | None
+    clip: tuple[float, float] | None
+    least: float
+
+
+def table_of(rows: ModelRows, form: TableForm, instants: FloatArray | None = None) -> Trajectories:
+    """Return rows of the model as a table.
 
     Args:
         rows: of the model.
-        sensors: names of the sensors of the table.
-        places: where the model's sensors stand among these.
-        called: the classes; None for a table without any.
+        form: of the table.
         instants: at which there was a table, be it of no row (s).
-        least: probability of existence below which a row is left out.
-        clip: width and height of the picture (px) at whose edge boxes end; None where they do not.
     """
+    sensors, places, called, clip, least = form
     t, ids, mean, variance, real, used, label, share = rows
     state, spread = mean.reshape(-1, 2, singer.MOTION), variance.reshape(-1, 2, singer.MOTION)
     sides, size = box_sides.corners(state), singer.box_size(state)
@@ -119,3 +126,21 @@ def with_classes(rows: ModelRows, tally: ClassTally | None, names: Sequence[str]
     label = np.array([number.get(name, -1) for name in called.tolist()], dtype=np.int64)
     t, ids, mean, variance, real, used, _, _ = rows
     return t, ids, mean, variance, real, used, label, np.nan_to_num(share)
+
+
+def reported_table(
+    rows: Callable[[], ModelRows],
+    tally: ClassTally | None,
+    form: TableForm,
+    now: float | None,
+) -> Trajectories:
+    """Return the table of a step from what its engine reported.
+
+    Args:
+        rows: gives the rows of the model.
+        tally: the votes for classes; None for no classes.
+        form: of the table.
+        now: time of the step (s); None before the first.
+    """
+    names = () if form.called is None else form.called.names
+    return table_of(with_classes(rows(), tally, names), form, None if now is None else np.array([now]))

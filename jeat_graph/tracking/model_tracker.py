@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from jeat_graph.data.diagnostics import Diagnostics
 from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.data.errors import DataError, JeatGraphError, TimeOrderError
 from jeat_graph.data.identity_links import IdentityLinks
+from jeat_graph.data.promised import promised
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.rig.common_picture import CommonPicture
@@ -35,13 +37,20 @@ from jeat_graph.tracking.identities.passes import took
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import diagnostics_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
-from jeat_graph.tracking.model_tables import ClassNames, Places, table_of, with_classes
+from jeat_graph.tracking.model_tables import (
+    ClassNames,
+    Places,
+    TableForm,
+    reported_table,
+    table_of,
+    with_classes,
+)
 from jeat_graph.tracking.old_names import OldNames
 from jeat_graph.tracking.one_at_a_time import OneAtATime, one_at_a_time
 from jeat_graph.tracking.pending_step import PendingStep
 from jeat_graph.tracking.prediction import Prediction, of_motion, still_there, time_from
 from jeat_graph.tracking.record_smoothing import unsmoothed
-from jeat_graph.tracking.scans import ScanLike, as_scans, sensor_index
+from jeat_graph.tracking.scans import ScanLike, as_scans, gather, sensor_index, sensors_of
 from jeat_graph.tracking.sensor_state import SensorState
 from jeat_graph.tracking.smoothed_instants import SmoothedInstants
 from jeat_graph.tracking.smoothed_tables import SmoothedTables
@@ -237,32 +246,22 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         self._watch.check(batch)  # before anything changes: a user may have made warnings errors
         kept = self._heaps.kept(batch)
         self._declare(batch)
-        # Several scans of one sensor at one time are one.
         codes = [self._engine_sensors.index(scan.sensor) for scan in batch]
-        sensor = np.repeat(codes, [len(scan) for scan in batch]).astype(np.int64)
-        order = np.argsort(sensor, kind="stable")
-        order = order if kept is None else order[kept[order]]  # those that count
-        scanning = np.array(sorted(set(codes)), dtype=np.int64)
-        boxes = np.concatenate([scan.boxes for scan in batch])[order]
-        scores = np.concatenate([scan.scores for scan in batch])[order]
-        numbers = np.bincount(sensor[order], minlength=len(self._engine_sensors))[scanning].astype(np.int64)
-        compared = None if embeddings is None else self._compare(embeddings, sensor)
-        similarity = None if compared is None else compared.log_ratio[:, order]
-        given = None if owners is None else owners[order]
-        self._model.take(
-            StepInput(t, scanning, numbers, boxes, scores, similarity, _surest_motion(batch), given)
-        )
-        self._order, self._given, self._causal = order, len(sensor), None
+        count, found = sum(map(len, batch)), gather(batch, codes, kept)
+        compared = None if embeddings is None else self._compare(embeddings, sensors_of(batch, codes))
+        similarity = None if compared is None else compared.log_ratio[:, found.order]
+        given = None if owners is None else owners[found.order]
+        self._model.take(StepInput(t, *found[:4], similarity, _surest_motion(batch), given))
+        self._order, self._given, self._causal = found.order, count, None
         if self._log is not None:
-            self._log.add(batch, took(self, len(sensor)), kept)
+            self._log.add(batch, took(self, count), kept)
         if self._diagnostics:
-            self._boxes = StepBoxes(t, sensor[order], boxes)
+            sensor = sensors_of(batch, codes)[found.order]
+            self._boxes = StepBoxes(t, sensor, found.boxes.copy())
         self._count_classes(batch)
         if compared is not None:
-            detection = np.arange(len(sensor), dtype=np.int64)
-            self._appearance = remember(
-                compared, self.assigned(len(sensor)), detection, self._model.identities()
-            )
+            detection = np.arange(count, dtype=np.int64)
+            self._appearance = remember(compared, self.assigned(count), detection, self._model.identities())
 
     def hand_over(self, taken: PendingStep | None) -> None:
         """Give the smoothers what a step took in; in order of time, and once."""
@@ -346,8 +345,8 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         """Return the tracks that are reported now, as the last step did: not the rows of earlier steps."""
         if self._causal is None:
             now = self.time
-            at = None if now is None else np.array([now])
-            self._causal = self._table(with_classes(self._model.rows(), self._classes, self._called), at)
+            parts = self._model.reported(), self._classes, self._form(), now
+            self._causal = promised(partial(reported_table, *parts))
         return self._causal
 
     def rows_below_least(self) -> int:
@@ -480,14 +479,16 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         """Return rows of the smoother in order of time, then of identity."""
         return self._instants.of(self._table(in_order(rows)))
 
-    def _table(self, rows: ModelRows, instants: FloatArray | None = None) -> Trajectories:
+    def _table(self, rows: ModelRows) -> Trajectories:
         """Return rows as a table, whose sensors are those of the configuration."""
-        names = None if self._classes is None else ClassNames(self._called, self._class_ids)
+        return table_of(rows, self._form())
+
+    def _form(self) -> TableForm:
+        """Return the form of tables as it is now."""
+        names = None if self._classes is None else ClassNames(tuple(self._called), self._class_ids)
         ends = self.config.output.clip and self._model.boxes_end_at_edge()
         clip = (self.config.image.width, self.config.image.height) if ends else None
-        return table_of(
-            rows, self.sensor_names, self._places, names, instants, clip, self.config.output.min_existence
-        )
+        return TableForm(self.sensor_names, self._places, names, clip, self.config.output.min_existence)
 
     def _find_places(self) -> None:
         """Find out where the model's sensors stand among all."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -154,6 +154,11 @@ class ReferenceModel(OneModel):
     def rows(self) -> ModelRows:
         """Return the tracks that the last step reports."""
         return self._answer.rows
+
+    def reported(self) -> Callable[[], ModelRows]:
+        """Return a function that gives these rows, after later steps too."""
+        rows = self.rows()
+        return lambda: rows
 
     def states(self) -> tuple[FloatArray, FloatArray]:
         """Return their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Sequence
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
 import numpy.typing as npt
 
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 
@@ -34,6 +36,52 @@ def as_scans(scans: Any) -> list[Scan]:
     if any(scan.t != batch[0].t for scan in batch):
         raise TimeOrderError("the scans of one step must have one and the same time")
     return batch
+
+
+class Gathered(NamedTuple):
+    """The boxes of scans of one time, sensor by sensor, those that count.
+
+    Attributes:
+        sensors: (K,) numbers of the sensors that have a scan, ascending.
+        numbers: (K,) of boxes of each.
+        boxes: (M, 4) left, top, width, height (px); perhaps the scan's own, not to be written to.
+        scores: (M,) of them; the same.
+        order: (M,) which of the boxes given, one scan after the other, each is.
+    """
+
+    sensors: IntArray
+    numbers: IntArray
+    boxes: FloatArray
+    scores: FloatArray
+    order: IntArray
+
+
+def gather(batch: Sequence[Scan], codes: Sequence[int], kept: BoolArray | None) -> Gathered:
+    """Put the boxes of scans of one time in order; several scans of one sensor are one.
+
+    Args:
+        batch: the scans.
+        codes: number of each one's sensor.
+        kept: which of their boxes count, one scan after the other; None for all.
+    """
+    if len(batch) == 1 and kept is None:
+        (scan,) = batch
+        count = len(scan)
+        places = np.arange(count, dtype=np.int64)
+        return Gathered(np.array(codes), np.array([count]), scan.boxes, scan.scores, places)
+    sensor = sensors_of(batch, codes)
+    order = np.argsort(sensor, kind="stable")
+    order = order if kept is None else order[kept[order]]
+    scanning = np.array(sorted(set(codes)), dtype=np.int64)
+    boxes = np.concatenate([scan.boxes for scan in batch])[order]
+    scores = np.concatenate([scan.scores for scan in batch])[order]
+    numbers = np.bincount(sensor[order], minlength=max(codes) + 1)[scanning].astype(np.int64)
+    return Gathered(scanning, numbers, boxes, scores, order)
+
+
+def sensors_of(batch: Sequence[Scan], codes: Sequence[int]) -> IntArray:
+    """Return the number of each box's sensor (M,), one scan after the other."""
+    return np.repeat(codes, [len(scan) for scan in batch]).astype(np.int64)
 
 
 def _listed(scans: Any) -> list[Scan]:

@@ -98,6 +98,12 @@ Out2<double> gaps_of(const GapCounts& gaps) {
     return array_of(both, filters::kGapBins);
 }
 
+Table table(const Rows& rows) {
+    return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, 2 * kMotion),
+                           array_of(rows.variance, 2 * kMotion), array_of(rows.real), array_of(rows.used),
+                           array_of(rows.label), array_of(rows.share));
+}
+
 // A tracker of the model: its state, its step, and what it keeps for the smoother.
 class Model {
 public:
@@ -125,7 +131,7 @@ public:
         check_lengths({sensors.size(), numbers.size()});
         check_lengths({boxes.shape(0), logits.size()});
         check(finite(span(boxes)) && finite(span(logits)), "boxes and logits are finite");
-        check(boxes.shape(1) == 4, "boxes have four sides");
+        check(boxes.shape(1) == 4, "boxes have four numbers");
         if (similarity) check(similarity->shape(0) == state.tracks.size(), "another number of tracks is compared");
         if (similarity) check_lengths({similarity->shape(1), logits.size()});
         if (similarity) check(finite(span(*similarity)), "similarities are finite");
@@ -146,8 +152,11 @@ public:
             scan.sensor = static_cast<std::size_t>(sensors.data()[k]);
             check(scan.sensor < state.sensors.size(), "no such sensor");
             check(number <= logits.size() - at, "fewer boxes than said");
-            const Sides* const first = reinterpret_cast<const Sides*>(boxes.data()) + at;
-            scan.boxes.assign(first, first + number);
+            scan.boxes.clear();
+            for (std::size_t j = at; j < at + number; ++j) {
+                const double* const box = boxes.data() + 4 * j;
+                scan.boxes.push_back({box[0], box[1], box[0] + box[2], box[1] + box[3]});
+            }
             scan.logits.assign(logits.data() + at, logits.data() + at + number);
             scan.similarity = {nullptr, 0, 0};
             if (similarity) scan.similarity = {similarity->data() + at, similarity->shape(0), similarity->shape(1)};
@@ -242,6 +251,8 @@ public:
     }
 
     Table rows() const { return table(now_.answer.rows); }
+    // A copy, for whoever may want the columns later.
+    Rows reported() const { return now_.answer.rows; }
     std::tuple<Out2<double>, Out2<double>> states() const {
         return {array_of(now_.answer.mean, kMean), array_of(now_.answer.covariance, kCovariance)};
     }
@@ -356,12 +367,6 @@ private:
         }
     }
 
-    static Table table(const Rows& rows) {
-        return std::make_tuple(array_of(rows.t), array_of(rows.track_id), array_of(rows.mean, 2 * kMotion),
-                              array_of(rows.variance, 2 * kMotion), array_of(rows.real), array_of(rows.used),
-                              array_of(rows.label), array_of(rows.share));
-    }
-
     Moment now_;
     Step step_;
     bool smooths_;
@@ -415,6 +420,8 @@ void bind(nb::module_& module) {
              "Identities of the living tracks (N,).")
         .def("born", [](const Moment& moment) { return moment.state.next_id - 1; },
              "Number of tracks started before it.");
+    nb::class_<Rows>(module, "Rows", "The tracks that a step reports.")
+        .def("columns", &table, "As Model.rows has them, also after later steps.");
     nb::class_<Model>(module, "Model", "The tracker's state and its step; see jeat_graph.tracking.reference.")
         .def(nb::init<const nb::object&, double, double, bool, double>(), nb::arg("constants"), nb::arg("width"),
              nb::arg("height"), nb::arg("known"), nb::arg("lag_s"),
@@ -428,7 +435,7 @@ void bind(nb::module_& module) {
              nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("similarity").noconvert() = nb::none(),
              nb::arg("motion").noconvert() = nb::none(), nb::arg("owners").noconvert() = nb::none(),
              "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
-             "top, right, bottom (px), logits of their scores (M,); similarity (N, M): how much more likely each box is of a\n"
+             "top, width, height (px), logits of their scores (M,); similarity (N, M): how much more likely each box is of a\n"
              "living track than of another by what both look like, as ln of the ratio; motion (11,): of the camera since\n"
              "its picture before, see jeat_graph.filters.picture_motion.PictureMotion; owners (M, 3): whose each box is,\n"
              "where that is given, below 0 for nobody's, at most one box of a scan each, and 1 where more of its owner's are\n"
@@ -450,6 +457,7 @@ void bind(nb::module_& module) {
         .def("set_state", exclusive(&Model::set_state), nb::arg("state"),
              "Go on from what state() returned. ValueError: it is not what a model can be in; nothing is changed then.")
         .def("rows", exclusive(&Model::rows), "Reported tracks: t, identity, mean (N, 10), variance (N, 10), posterior, sensors, class, its share.")
+        .def("reported", exclusive(&Model::reported), "What rows() returns, to be made columns when they are wanted.")
         .def("states", exclusive(&Model::states), "Their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7.")
         .def("fit", exclusive(&Model::fit),
              "Of the boxes of the last step the squared distance of the centre (M,), NaN where it began a track, and\n"

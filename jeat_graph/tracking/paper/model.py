@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -169,6 +169,11 @@ class PaperModel(SmoothsRecords):
     def rows(self) -> ModelRows:
         """Return the confirmed tracks."""
         return _rows(self._reported(), self._now.t)[0]
+
+    def reported(self) -> Callable[[], ModelRows]:
+        """Return a function that gives these rows, after later steps too."""
+        rows = self.rows()
+        return lambda: rows
 
     def predicted(self, t: float) -> tuple[ModelRows, FloatArray]:
         """Return the confirmed tracks at a later time (s), and the covariances of what is told."""
