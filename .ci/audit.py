@@ -16,7 +16,7 @@ from importlib.metadata import version
 _PROBE = "numpy"
 _PATIENCE_S = 10.0
 #: A whole look-up takes about a minute; an index that stops answering on the way must not hold up everything.
-_LOOK_UP_S = 600.0
+_QUERY_S = 600.0
 #: Findings that are known and do no harm here, by their number, and why.
 ACCEPTED: dict[str, str] = {}
 
@@ -38,7 +38,7 @@ def main() -> int:
         return 0
     command = [sys.executable, "-m", "pip_audit", "--local", "--format", "json", "--progress-spinner", "off"]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=_LOOK_UP_S)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=_QUERY_S)
         packages = json.loads(done.stdout)["dependencies"]
     except subprocess.TimeoutExpired:
         print("audit: the index stopped answering; nothing was looked up")
@@ -46,14 +46,14 @@ def main() -> int:
     except (ValueError, KeyError):
         print(f"audit: pip-audit failed: {done.stderr.strip()[-300:]}")
         return 1 if index_answers() else 0  # what failed without an index says nothing of the packages
-    looked_up = [package for package in packages if "vulns" in package]
+    checked = [package for package in packages if "vulns" in package]
     bad = [
         f"{package['name']} {package['version']}: {weakness['id']}, mended in {weakness['fix_versions']}"
-        for package in looked_up
+        for package in checked
         for weakness in package["vulns"]
         if not ACCEPTED.keys() & {weakness["id"], *weakness.get("aliases", [])}
     ]
-    print(*bad, f"audit: {len(looked_up)} of {len(packages)} packages looked up", sep="\n")
+    print(*bad, f"audit: {len(checked)} of {len(packages)} packages looked up", sep="\n")
     return 1 if bad else 0
 
 

@@ -40,14 +40,14 @@ def licence(package: Distribution) -> str:
         line.split(" :: ")[-1] for line in data.get_all("Classifier") or [] if line.startswith("License ::")
     ]
     text = (data["License"] or "").strip().splitlines()
-    said = data["License-Expression"] or ", ".join(classified) or (text[0] if text else "")
-    if not said:
+    licence_text = data["License-Expression"] or ", ".join(classified) or (text[0] if text else "")
+    if not licence_text:
         files = [
             file for file in package.files or [] if re.search(r"licen[cs]e|copying", file.name, re.IGNORECASE)
         ]
         lines = [line.strip() for file in files for line in file.read_text(encoding="utf-8").splitlines()[:3]]
-        said = next((line for line in lines if line), "")
-    return said
+        licence_text = next((line for line in lines if line), "")
+    return licence_text
 
 
 def needed(project: str, extras: frozenset[str]) -> tuple[dict[str, Distribution], set[str]]:
@@ -93,12 +93,12 @@ def main() -> int:
         packages, missing = needed(project, frozenset([extra] if extra else []))
         print(f"\n{project}{f'[{extra}]' if extra else ''}:")
         for name in sorted(set(packages) - shown):
-            said = licence(packages[name])
+            licence_text = licence(packages[name])
             reason = REASONS.get(name)
-            forbidden = reason is None and (not said or bool(BINDING.search(said)))
+            forbidden = reason is None and (not licence_text or bool(BINDING.search(licence_text)))
             bad += forbidden
             mark = "FORBIDDEN " if forbidden else ""
-            print(f"  {mark}{name} {packages[name].version}: {said or 'says nothing'}")
+            print(f"  {mark}{name} {packages[name].version}: {licence_text or 'says nothing'}")
             if reason:
                 print(f"      {reason}")
         for name in sorted(missing):

@@ -100,9 +100,9 @@ def join(
         made = cover[cover >= 0]
         continued, continues = cover >= 0, np.zeros(len(cover), dtype=bool)
         continues[links.head[made]] = True
-        new, gone = ~continues & ~first, ~continued & ~last
+        new, leaves = ~continues & ~first, ~continued & ~last
         births = np.asarray((np.bincount(born[new], minlength=2) + 1.0) / steps, dtype=np.float64)
-        leaving = np.bincount(left[gone], minlength=2) + 1.0
+        leaving = np.bincount(left[leaves], minlength=2) + 1.0
         exits = leaving / (leaving + np.bincount(left[continued], minlength=2) + 1.0)
         gaps = u[made]
         median = float(np.median(np.append(gaps[gaps > 1.5 * step_s], [_PRIOR_GAP_S] * _PRIOR_GAPS)))

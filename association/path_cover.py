@@ -75,8 +75,8 @@ def preferring(links: Links, best: IntArray, preferred: IntArray, within: float)
     np.add.at(loss, part[links.tail[differing]], sign * links.gain[differing])
     out = best.copy()
     switched = loss[part[links.tail[differing]]] <= within
-    gone, taken = differing[switched & (sign > 0.0)], differing[switched & (sign < 0.0)]
-    out[links.tail[gone]] = -1
+    removed, taken = differing[switched & (sign > 0.0)], differing[switched & (sign < 0.0)]
+    out[links.tail[removed]] = -1
     out[links.tail[taken]] = taken
     return out
 

@@ -172,8 +172,8 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
     for row in sorted(result["rows"], key=lambda row: (sum(row["change"]), row["term"])):
         line: dict[str, Cell] = {"without": row["term"]}
         for name, change, error in zip(HEADLINE, row["change"], row["std_error"], strict=True):
-            told = error is not None and np.isfinite(error)
-            line[name] = f"{change:+.1f}" + (f"±{error:.1f}" if told else "")
+            measured = error is not None and np.isfinite(error)
+            line[name] = f"{change:+.1f}" + (f"±{error:.1f}" if measured else "")
         worst, best = (pick(row["by_set"].items(), key=lambda item: item[1]) for pick in (min, max))
         line["greatest loss of a set"] = f"{worst[1]:+.1f} {worst[0]}" if worst[1] < 0.0 else None
         line["greatest gain of one"] = f"{best[1]:+.1f} {best[0]}" if best[1] > 0.0 else None

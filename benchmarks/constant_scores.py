@@ -98,8 +98,8 @@ def made_ready(group: RecordingSet) -> ReadySet:
         for part in (one.detections, one.truth):
             for name, value in sorted(vars(part).items()):
                 plain = isinstance(value, np.ndarray) and not value.dtype.hasobject
-                told = value.tolist() if isinstance(value, np.ndarray) and not plain else value
-                digest.update(name.encode() + (value.tobytes() if plain else repr(told).encode()))
+                shown = value.tolist() if isinstance(value, np.ndarray) and not plain else value
+                digest.update(name.encode() + (value.tobytes() if plain else repr(shown).encode()))
         digest.update(repr(one.config).encode())
     return ReadySet(group.name, ready, digest.hexdigest())
 

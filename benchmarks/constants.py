@@ -174,13 +174,14 @@ def answers(
         "singles": singles,
         "searched": searched,
         "direction": [
-            {**_told(one), "set": name, **study.beside(name, one.point)} for name, one in direction.items()
+            {**_chosen_row(one), "set": name, **study.beside(name, one.point)}
+            for name, one in direction.items()
         ],
         "random": [
             {
                 "seed": seed,
-                "without": {name: _told(chosen) for name, chosen in one.without.items()},
-                "with": _told(one.chosen),
+                "without": {name: _chosen_row(chosen) for name, chosen in one.without.items()},
+                "with": _chosen_row(one.chosen),
             }
             for seed, one in zip(seeds, starts, strict=True)
         ],
@@ -188,7 +189,7 @@ def answers(
     }
 
 
-def _told(chosen: Chosen[ModelConstants]) -> dict[str, Any]:
+def _chosen_row(chosen: Chosen[ModelConstants]) -> dict[str, Any]:
     return {
         "tried": chosen.tried,
         "gained": chosen.gained,

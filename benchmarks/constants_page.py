@@ -107,8 +107,8 @@ def _sets(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _with_error(value: float, error: float | None, sign: str = "") -> str:
-    told = error is not None and math.isfinite(error)
-    return f"{value:{sign}.1f}" + (f"±{error:.1f}" if told else "")
+    measured = error is not None and math.isfinite(error)
+    return f"{value:{sign}.1f}" + (f"±{error:.1f}" if measured else "")
 
 
 def _direction(result: Mapping[str, Any]) -> Table:
@@ -207,8 +207,8 @@ def write_page(path: Path, result: Mapping[str, Any], found: Mapping[str, Table]
 
 
 def _scatter(rows: Sequence[Mapping[str, Any]]) -> str:
-    told = ", ".join(f"{row['set']} {row[CAUSAL]['spread']:.1f}" for row in rows if row["label"] == NEAR)
-    return f"Over the points near the shipped, the standard deviation of a set's sum (causal) is: {told}."
+    measured = ", ".join(f"{row['set']} {row[CAUSAL]['spread']:.1f}" for row in rows if row["label"] == NEAR)
+    return f"Over the points near the shipped, the standard deviation of a set's sum (causal) is: {measured}."
 
 
 def _noticed(singles: Sequence[Mapping[str, Any]]) -> str:

@@ -127,8 +127,8 @@ class _World:
         junk, level = self._junk[again].copy(), self._junk_scores[again]
         if draw.way == "moving":
             span = self._end - self._begin
-            gone = junk[:, :2] - self._begin + t * self._junk_speed[again]
-            junk[:, :2] = self._begin + np.mod(gone, span)
+            moved = junk[:, :2] - self._begin + t * self._junk_speed[again]
+            junk[:, :2] = self._begin + np.mod(moved, span)
         level = np.clip(level + rng.normal(0.0, 0.04, len(level)), 0.03, 0.6)
         found = [
             self._moved(boxes[seen], draw.jitter, errors[seen, :4]),

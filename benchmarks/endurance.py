@@ -107,12 +107,12 @@ def run(args: argparse.Namespace) -> int:
                 json.dump([vars(one) for one in periods], file, indent=1)
 
     load = Load(args.hours, args.vehicles, args.seed)
-    periods, told = run_endurance(load, tell, args.checkpoint)
+    periods, notes = run_endurance(load, tell, args.checkpoint)
     sys.stdout.write(table_of(periods).render())
-    print(f"{len(told)} warnings")
-    for text in told:
+    print(f"{len(notes)} warnings")
+    for text in notes:
         print(f"jeat-graph benchmarks: warning: {text}", file=sys.stderr)
-    return 1 if told else 0
+    return 1 if notes else 0
 
 
 def run_endurance(
@@ -140,7 +140,7 @@ def run_endurance(
         file = Path(folder) / "state.npz" if checkpoint is None else Path(checkpoint)
         day = _Day(load, file, progress)
         day.run()
-    return day.periods, sorted({*day.told, *(str(one.message) for one in caught)})
+    return day.periods, sorted({*day.notes, *(str(one.message) for one in caught)})
 
 
 class _Rows:
@@ -168,13 +168,13 @@ class _Day:
 
     Attributes:
         periods: those that are over.
-        told: warnings so far.
+        notes: warnings so far.
     """
 
     def __init__(self, load: Load, file: Path, progress: Callable[[list[Period]], object]) -> None:
         self._load, self._file, self._progress = load, file, progress
         self.periods: list[Period] = []
-        self.told: list[str] = []
+        self.notes: list[str] = []
         self._rows = _Rows()
         self._took, self._saves = LatencyCounts(), LatencyCounts()
         config = load_config("default")
@@ -189,7 +189,7 @@ class _Day:
     def _ends(self) -> Ends:
         def warn(text: str) -> None:
             if text.startswith(_WARNING):
-                self.told.append(text.removeprefix(_WARNING))
+                self.notes.append(text.removeprefix(_WARNING))
 
         def note(t: float, table: Trajectories, *_: object) -> None:
             self._reported = len(table)
@@ -203,7 +203,7 @@ class _Day:
             "periods": [vars(one) for one in self.periods],
             "took": (self._took.counts, self._took.max_s),
             "saves": (self._saves.counts, self._saves.max_s),
-            "told": self.told,
+            "notes": self.notes,
         }
 
     def _go_on(self, more: dict[str, Any]) -> None:
@@ -211,7 +211,7 @@ class _Day:
         if kept["load"] != vars(self._load):
             raise ConfigError(f"{self._file}: is of another endurance test: {kept['load']}")
         self.periods = [Period(**one) for one in kept["periods"]]
-        self.told, self._rows.count = kept["told"], more["smoothed"]
+        self.notes, self._rows.count = kept["notes"], more["smoothed"]
         self._took.counts, self._took.max_s = kept["took"]
         self._saves.counts, self._saves.max_s = kept["saves"]
 

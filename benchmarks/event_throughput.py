@@ -258,6 +258,6 @@ def _timed(found: list[Work], count: int, repeats: int) -> list[dict[str, str | 
             key = (task, package)
             speed = 1e-6 * count / best[key] if key in best else None
             absent = "not installed" if package in PEERS and find_spec(package) is None else "–"
-            told = "" if key in best else why.get(key, absent)
-            rows.append({"task": task, "package": package, "mev_s": speed, "why": told})
+            reason = "" if key in best else why.get(key, absent)
+            rows.append({"task": task, "package": package, "mev_s": speed, "why": reason})
     return rows

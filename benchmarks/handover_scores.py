@@ -26,19 +26,20 @@ def pair_scores(over: Handover, first: IntArray, second: IntArray) -> dict[str, 
         second: (B,) those at the second camera.
 
     Returns:
-        `right`, `made` and `common` pairs; `said` and `true` numbers (10,) of pairs by tenth of probability.
+        `right`, `made` and `common` pairs; `expected` and `true` numbers (10,) of pairs by tenth of
+        probability.
     """
     made = (first[over.first] == second[over.second]) & (first[over.first] >= 0)
     common = np.intersect1d(first[first >= 0], second[second >= 0])
     pairs, probability = over.fitted.pairs, over.fitted.marginals.pair
-    told = probability > _LEAST_PROBABILITY
-    tenth = np.minimum((probability[told] * _TENTHS).astype(np.int64), _TENTHS - 1)
-    is_right = ((first[pairs.i] == second[pairs.j]) & (first[pairs.i] >= 0))[told]
+    kept = probability > _LEAST_PROBABILITY
+    tenth = np.minimum((probability[kept] * _TENTHS).astype(np.int64), _TENTHS - 1)
+    is_right = ((first[pairs.i] == second[pairs.j]) & (first[pairs.i] >= 0))[kept]
     return {
         "right": int(made.sum()),
         "made": len(made),
         "common": len(common),
-        "said": np.bincount(tenth, probability[told], _TENTHS).tolist(),
+        "expected": np.bincount(tenth, probability[kept], _TENTHS).tolist(),
         "true": np.bincount(tenth, is_right, _TENTHS).tolist(),
         "pairs": np.bincount(tenth, minlength=_TENTHS).tolist(),
     }
@@ -52,8 +53,10 @@ def f1(rows: list[dict[str, Any]]) -> float:
 
 def calibration_error(rows: list[dict[str, Any]]) -> float:
     """Expected calibration error of pooled `pair_scores`: mean distance of said and true share, by tenths."""
-    said, true, pairs = (np.sum([row[name] for row in rows], axis=0) for name in ("said", "true", "pairs"))
-    return float(np.abs(said - true).sum() / max(pairs.sum(), 1))
+    expected, true, pairs = (
+        np.sum([row[name] for row in rows], axis=0) for name in ("expected", "true", "pairs")
+    )
+    return float(np.abs(expected - true).sum() / max(pairs.sum(), 1))
 
 
 def travel_time_errors(corridor: Corridor, t_first: FloatArray, t_second: FloatArray) -> list[dict[str, Any]]:

@@ -154,9 +154,9 @@ def wrong(scene: DrawnScene, made: _Made) -> int:
     """Count boxes whose track is not the true one, those of no track included."""
     count = 0
     for (row, box), truth in zip(made, scene.truth, strict=True):
-        said = np.full(len(truth), -1)
-        said[box] = row
-        count += int((said != truth).sum())
+        predicted = np.full(len(truth), -1)
+        predicted[box] = row
+        count += int((predicted != truth).sum())
     return count
 
 

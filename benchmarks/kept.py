@@ -54,20 +54,20 @@ def kept_or_found(job: tuple[Finding, str | None]) -> RawFound:
 
 def digest(finding: Finding) -> str:
     """Return a digest of all that a finding's result follows from."""
-    told = hashlib.sha256(_code().encode())
-    told.update(repr((finding.sensor, finding.settings)).encode())
-    told.update(repr(detector_named(finding.detector, _KINDS[finding.sensor])).encode())
+    sha = hashlib.sha256(_code().encode())
+    sha.update(repr((finding.sensor, finding.settings)).encode())
+    sha.update(repr(detector_named(finding.detector, _KINDS[finding.sensor])).encode())
     for path in sorted(p for p in finding.segment.folder.rglob("*") if p.is_file()):
-        told.update(f"{path.relative_to(finding.segment.folder)} {sha256_of(path)}\n".encode())
-    return told.hexdigest()
+        sha.update(f"{path.relative_to(finding.segment.folder)} {sha256_of(path)}\n".encode())
+    return sha.hexdigest()
 
 
 @cache
 def _code() -> str:
-    told = hashlib.sha256()
+    sha = hashlib.sha256()
     for name in sorted(sources_of(_DETECTING)):
-        told.update(f"{name} {sha256_of(ROOT / name)}\n".encode())
-    return told.hexdigest()
+        sha.update(f"{name} {sha256_of(ROOT / name)}\n".encode())
+    return sha.hexdigest()
 
 
 def write_kept(detections: Detections, path: Path) -> None:

@@ -227,8 +227,8 @@ def _read(one: FoundRecording, how: LayoutOptions) -> JudgedRecording:
     for name, path in (*one.detections.items(), *_given(one, how)):
         plain = name == ""
         form = None if path not in one.detections.values() else one.forms[1]
-        told = {} if plain or path.suffix in (".csv", ".parquet", ".gz") else options
-        found = read_detections(path, sensor=None if plain else name, fmt=form, **told)
+        given = {} if plain or path.suffix in (".csv", ".parquet", ".gz") else options
+        found = read_detections(path, sensor=None if plain else name, fmt=form, **given)
         if how.classes and found.classes is not None:
             found = found.where(np.isin(found.classes, [*how.classes, ""]))
         parts.append(found)

@@ -167,9 +167,9 @@ def most_influential(singles: Sequence[dict[str, Any]], number: int) -> list[str
 
 def unnoticed(singles: Sequence[dict[str, Any]]) -> list[str]:
     """Names of the constants that no set notices, neither in causal tables nor in smoothed ones."""
-    told = {row["name"] for row in singles}
+    named = {row["name"] for row in singles}
     return sorted(
-        told - {r["name"] for r in singles if not (_small(r["by_set"]) and _small(r.get("smoothed", {})))}
+        named - {r["name"] for r in singles if not (_small(r["by_set"]) and _small(r.get("smoothed", {})))}
     )
 
 

@@ -49,11 +49,11 @@ def causal_cost(duration_s: float) -> dict[str, Any]:
         table = tracker.step(scan)
         stepped = time.thread_time()
         rows = tracker.last_measurements()[0]
-        told = time.thread_time()
+        done = time.thread_time()
         taken.append(road.step(scan.t, rows, table.track_id))
         now = time.thread_time()
         if scan.t > _LEAVE_OUT_S:
-            times.append((stepped - begin, now - told))
+            times.append((stepped - begin, now - done))
         if len(taken) == _CHUNK:
             begin = time.thread_time()
             road.columns(taken)

@@ -129,12 +129,12 @@ def _frames(path: Path) -> Iterator[tuple[float, Mapping[str, Any]]]:
 
 
 def _time(path: Path, properties: Mapping[str, Any]) -> float:
-    told = properties.get("timestamp")
-    if told is not None:
+    stamp = properties.get("timestamp")
+    if stamp is not None:
         try:
-            return float(told)
+            return float(stamp)
         except (TypeError, ValueError):
-            raise DataError(f"timestamp {told!r} is no number of seconds", path) from None
+            raise DataError(f"timestamp {stamp!r} is no number of seconds", path) from None
     if found := _UNIX_NAME.match(path.stem):
         return int(found[1]) + 1e-9 * int(found[2])
     if found := _DATE_NAME.match(path.stem):

@@ -255,8 +255,8 @@ def interpolate_to(
 
     step = t[after] - t[before]
     into = np.clip(times[frame] - t[before], 0.0, step)
-    told = np.abs(moments[np.maximum(now, 0)] - times[frame]) <= TIME_TOLERANCE_S
-    apart = told | (rank[after] - rank[before] > 1 if at_each else False)
+    sampled = np.abs(moments[np.maximum(now, 0)] - times[frame]) <= TIME_TOLERANCE_S
+    apart = sampled | (rank[after] - rank[before] > 1 if at_each else False)
     ok = ~apart | (into <= TIME_TOLERANCE_S) | (step - into <= TIME_TOLERANCE_S)
     if max_gap_s is not None:
         ok &= (step <= max_gap_s + TIME_TOLERANCE_S) | (into <= TIME_TOLERANCE_S)

@@ -19,7 +19,7 @@ from jeat_graph.eval.protocols.plain import take_truth
 from jeat_graph.eval.protocols.record import FrameBoxes, Judged, JudgingProtocol
 
 #: Classes that are judged, with one that looks alike and may be found too.
-ALIKE = {"car": "van", "pedestrian": "person"}
+SIMILAR = {"car": "van", "pedestrian": "person"}
 _REGION = "dontcare"
 # Objects beyond these need not be found; a track that is matched to nothing must be higher (px).
 _MOST_OCCLUDED, _MOST_TRUNCATED, _LEAST_HEIGHT_PX = 2, 0, 25.0
@@ -28,7 +28,7 @@ _EPS = float(np.finfo(np.float64).eps)
 
 
 def judge(frame: FrameBoxes, wanted: str | None) -> Judged:
-    """Say what counts in one frame, for a class of `ALIKE`."""
+    """Say what counts in one frame, for a class of `SIMILAR`."""
     assert frame.classes is not None
     assert frame.truncation is not None
     assert frame.occlusion is not None
@@ -63,7 +63,7 @@ def prepare(truth: GroundTruth, tracks: Trajectories, wanted: str | None) -> tup
     if tracks.classes is None:
         raise DataError("the rules of KITTI need tracks with classes; these have none")
     classes = np.char.lower(truth.classes)
-    own = (truth.object_id >= 0) & np.isin(classes, (wanted, ALIKE[wanted]))
+    own = (truth.object_id >= 0) & np.isin(classes, (wanted, SIMILAR[wanted]))
     rows = own | (classes == _REGION)
     chosen = take_truth(replace(truth, classes=classes, ignore=classes == _REGION), rows)
     return chosen, tracks.take((np.char.lower(tracks.classes) == wanted) & (tracks.track_id >= 0))
@@ -77,6 +77,6 @@ PROTOCOL = JudgingProtocol(
     "`DontCare` region",
     judge=judge,
     prepare=prepare,
-    classes=tuple(ALIKE),
+    classes=tuple(SIMILAR),
     suits=lambda truth: truth.truncation is not None,
 )

@@ -58,9 +58,10 @@ def track(
     from jeat_graph.tracking.tracker import Tracker
 
     recording = recording_of(detections, {**options, "image": image})
-    recording, settings, _ = in_common(recording, _settings(_told(config, detections), image, detections))
-    recording, _, said = find_clocks(recording, settings, "the detections")
-    for line in said:
+    settings = _settings(_with_declared(config, detections), image, detections)
+    recording, settings, _ = in_common(recording, settings)
+    recording, _, messages = find_clocks(recording, settings, "the detections")
+    for line in messages:
         warnings.warn(line, InputWarning, stacklevel=2)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
     tracker = Tracker(fit_input(settings, recording)[0])
@@ -72,16 +73,16 @@ def track(
     return Tracks(causal, tracker.finish() if wanted else None)
 
 
-def _told(config: Config | PathLike, recording: object) -> Config | PathLike:
+def _with_declared(config: Config | PathLike, recording: object) -> Config | PathLike:
     """Return the configuration `default` with what a table says of its detectors; another as it is."""
     from jeat_graph.config.reading import load_config
-    from jeat_graph.io.tables.sensor_columns import as_settings, said_by, said_by_frame
-    from jeat_graph.runs.track_files import TOLD_CONFIG
+    from jeat_graph.io.tables.sensor_columns import as_settings, declared_by, declared_by_frame
+    from jeat_graph.runs.track_files import DECLARING_CONFIG
 
-    if config != TOLD_CONFIG or isinstance(recording, Detections):
+    if config != DECLARING_CONFIG or isinstance(recording, Detections):
         return config
-    said = said_by(recording) if isinstance(recording, (str, Path)) else said_by_frame(recording)
-    return load_config(TOLD_CONFIG, as_settings(said))
+    declared = declared_by(recording) if isinstance(recording, (str, Path)) else declared_by_frame(recording)
+    return load_config(DECLARING_CONFIG, as_settings(declared))
 
 
 def _settings(config: Config | PathLike, image: tuple[float, float] | None, *recordings: object) -> Config:
@@ -90,8 +91,8 @@ def _settings(config: Config | PathLike, image: tuple[float, float] | None, *rec
 
     files = [one for one in recordings if isinstance(one, (str, Path))]
     found = as_config(config, image)
-    said = image is not None or (isinstance(config, Config) and found.input.picture == "given")
-    if said or not files:
+    size_given = image is not None or (isinstance(config, Config) and found.input.picture == "given")
+    if size_given or not files:
         return found
     return with_picture(found, (), facts_beside(files))[0]
 
@@ -202,8 +203,8 @@ def compare(
     else:
         recording, objects = recording_and_truth(detections, truth, how)
     recording, start, _ = in_common(recording, _settings(config, image, detections))
-    recording, _, said = find_clocks(recording, start, "the detections")
-    for line in said:
+    recording, _, messages = find_clocks(recording, start, "the detections")
+    for line in messages:
         warnings.warn(line, InputWarning, stacklevel=2)
     settings = fit_input(start, recording)[0]
     return compare_run(track_measured(settings, at_measurement(recording, settings)), objects, lags_s)
@@ -258,8 +259,8 @@ def calibrate(
         recordings, truths = [one for one, _ in read], [one for _, one in read]
     recordings = [in_common(one, given)[0] for one in recordings]
     names = [f"recording {k + 1}" for k in range(len(recordings))]
-    start, said = with_clocks(recordings, without_ways(given), names)
-    for line in said:
+    start, messages = with_clocks(recordings, without_ways(given), names)
+    for line in messages:
         warnings.warn(line, InputWarning, stacklevel=2)
     start = fit_input(start, *recordings)[0]
     recordings = [at_measurement(one, start) for one in recordings]

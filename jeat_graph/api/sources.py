@@ -132,10 +132,10 @@ def tables_of(
 
 def for_frames(options: ReadingOptions) -> ReadingOptions:
     """Return options with the names of classes read from their file, if they stand in one."""
-    said = options.get("class_names")
-    if said is None:
+    names = options.get("class_names")
+    if names is None:
         return options
-    return {**options, "class_names": names_by_number(said, None, LISTS_COUNT_FROM)}
+    return {**options, "class_names": names_by_number(names, None, LISTS_COUNT_FROM)}
 
 
 def as_list(values: Any) -> list[Any]:

@@ -162,8 +162,8 @@ def _truth_between(
     extra = np.concatenate([leaving, entering])
     before = order[start[left - 1] : stop[left - 1]] if left else order[:0]
     after = order[start[right + 1] : stop[right + 1]] if right + 1 < len(frames) else order[:0]
-    gone_on = [_moved_on(truth, leaving, before, t), _moved_on(truth, entering, after, t)]
-    boxes = np.vstack([boxes, *gone_on])
+    moved = [_moved_on(truth, leaving, before, t), _moved_on(truth, entering, after, t)]
+    boxes = np.vstack([boxes, *moved])
     ids = np.concatenate([ids, truth.object_id[extra]])
     ignored = np.concatenate([ignored, np.ones(len(extra), dtype=bool)])
     speed = np.concatenate([speed, np.full(len(extra), np.nan)])

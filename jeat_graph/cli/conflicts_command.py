@@ -72,8 +72,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError("--picture says nothing without --camera: where the road is in it")
     if (args.frames is None) != (args.tracks is None):
         raise ConfigError("films need both --frames and --run")
-    told = {"ttc_s": args.ttc, "drac": args.drac, "pet_s": args.pet, "most_doubt": args.doubt}
-    config = ConflictConfig(**{name: value for name, value in told.items() if value is not None})
+    given = {"ttc_s": args.ttc, "drac": args.drac, "pet_s": args.pet, "most_doubt": args.doubt}
+    config = ConflictConfig(**{name: value for name, value in given.items() if value is not None})
     later_s = clock_s(args.begin)
     out = Path(args.out)
     check_folder(out)

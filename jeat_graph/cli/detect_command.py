@@ -28,7 +28,7 @@ STDOUT = "-"
 #: Decimal places of boxes (px) and of times (s) on stdout.
 _PLACES, _TIME_PLACES = 3, 6
 #: Decimal places of embeddings, numbers of −1 to 1.
-_LOOK_PLACES = 4
+_EMBEDDING_PLACES = 4
 WRITES = ("out",)
 HELP = "find vehicles in raw pictures and events and write a file of detections"
 
@@ -76,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         check_keeps(request.files, out)
     check_writable(out)
     found, request = _found(request)
-    write_detections(found, out, said=known_of(request, partial(say, "detect")))
+    write_detections(found, out, declared=known_of(request, partial(say, "detect")))
     boxes = np.diff(found.scan_start)
     for k, name in enumerate(found.sensors):
         of_sensor = found.scan_sensor == k
@@ -96,9 +96,9 @@ def _found(request: DetectRequest) -> tuple[Detections, DetectRequest]:
     if not is_live_request(request):
         request = resolved(request, partial(say, "detect"))
         return detect_with_bar(request, "detect"), request
-    looked: list[DetectRequest] = []
-    found = _detect_with_clock(request, partial(say, "detect"), lambda one, _: looked.append(one))
-    return found, looked[0]
+    asked: list[DetectRequest] = []
+    found = _detect_with_clock(request, partial(say, "detect"), lambda one, _: asked.append(one))
+    return found, asked[0]
 
 
 def _to_stdout(request: DetectRequest) -> int:
@@ -123,8 +123,10 @@ def _write_lines(scans: Iterable[Scan]) -> None:
         if scan.classes is not None:
             line["classes"] = scan.classes.tolist()
         if scan.embeddings is not None and len(scan.boxes):
-            looks = np.round(scan.embeddings.astype(np.float64), _LOOK_PLACES)
-            line["embeddings"] = [None if np.isnan(look).any() else look.tolist() for look in looks]
+            embeddings = np.round(scan.embeddings.astype(np.float64), _EMBEDDING_PLACES)
+            line["embeddings"] = [
+                None if np.isnan(embedding).any() else embedding.tolist() for embedding in embeddings
+            ]
         if scan.camera_motion is not None:
             line["camera_motion"] = scan.camera_motion.tolist()
         sys.stdout.write(json.dumps(line) + "\n")

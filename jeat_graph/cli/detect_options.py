@@ -49,7 +49,7 @@ def add_detecting(parser: argparse._ActionsContainer) -> None:
         help="one network for frames and events of the same pixels (`train fused`), instead of the "
         "other two; either input may be missing",
     )
-    add_looking(parser)
+    add_detector_options(parser)
     add_frame_times(parser)
     add(
         "--event-rate",
@@ -91,7 +91,7 @@ def frame_times(args: argparse.Namespace) -> TriggerChoice | None:
     return None if args.frame_times is None else trigger_choice(args.frame_times)
 
 
-def add_looking(parser: argparse._ActionsContainer) -> None:
+def add_detector_options(parser: argparse._ActionsContainer) -> None:
     """Declare how detectors look."""
     add = parser.add_argument
     add(
@@ -239,14 +239,14 @@ def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:
         "--frame-times": ("--events", args.events, args.frame_times is not None),
         "--event-delay": ("--events", args.events, args.event_delay != 0.0),
     }
-    return [(name, source) for name, (source, file, said) in given.items() if said and file is None]
+    return [(name, source) for name, (source, file, is_given) in given.items() if is_given and file is None]
 
 
 def _given(args: argparse.Namespace) -> list[str]:
     return [source for source in (args.frames, args.events) if source is not None]
 
 
-def _looking_for(
+def _with_detector_options(
     settings: DetectionSettings, classes: tuple[str, ...], args: argparse.Namespace
 ) -> DetectionSettings:
     """Return the settings with `--class` for each network that looks.
@@ -258,14 +258,14 @@ def _looking_for(
 
     from jeat_graph.data.errors import ConfigError
 
-    looking = {
+    choices = {
         "model_frames": args.frames is not None and args.detector_frames != "motion",
         "model_events": args.events is not None and args.detector_events != "motion",
         "model_fused": args.detector_fused is not None,
     }
-    if not any(looking.values()):
+    if not any(choices.values()):
         raise ConfigError("--class: what moves has no class; a network knows some (--detector-frames)")
-    named = [name for name, does in looking.items() if does]
+    named = [name for name, does in choices.items() if does]
     if any(getattr(settings, name).classes for name in named):
         raise ConfigError(f"--class and {named[0]}.classes say the same twice: leave one out")
     chosen = {name: replace(getattr(settings, name), classes=classes) for name in named}
@@ -295,7 +295,7 @@ def detect_request(args: argparse.Namespace) -> DetectRequest:
         raise ConfigError("--mask none goes with no other --mask")
     settings = load_settings(args.detection_config, args.detection_set)
     if args.classes is not None:
-        settings = _looking_for(settings, tuple(args.classes), args)
+        settings = _with_detector_options(settings, tuple(args.classes), args)
     if args.event_rate is not None:
         try:
             settings = replace(settings, events=replace(settings.events, rate_hz=args.event_rate))

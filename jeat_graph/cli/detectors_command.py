@@ -22,7 +22,7 @@ HELP = (
     "they are installed; download one"
 )
 #: Pictures that are looked at to time a network, and the first ones that do not count.
-_LOOKS, _WARM_UP = 5, 1
+_TIMED, _WARM_UP = 5, 1
 #: Height and width of a picture to time with (px).
 _PICTURE = (720, 1280)
 
@@ -101,13 +101,13 @@ def _of_file(path: Path, *, timed: bool) -> dict[str, Cell]:
     return found
 
 
-def _time(look: ModelPictureDetector) -> float:
+def _time(model: ModelPictureDetector) -> float:
     """Return how long a network takes for a picture (ms), the middle of several."""
     rng = np.random.default_rng(0)
     picture = rng.integers(0, 256, (*_PICTURE, 3), dtype=np.uint8)
     taken = []
-    for k in range(_WARM_UP + _LOOKS):
+    for k in range(_WARM_UP + _TIMED):
         begin = time.perf_counter()
-        look(picture, float(k))
+        model(picture, float(k))
         taken.append(time.perf_counter() - begin)
     return 1e3 * float(np.median(taken[_WARM_UP:]))

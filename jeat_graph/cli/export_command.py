@@ -53,6 +53,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Export."""
     some = {name: getattr(args, name) for name in SOME_TAKE}
-    said = write_export(ExportRequest(args.source, args.out, args.to, **some, reading=tables_read(args)))
-    print(f"wrote {args.out}{said}", file=sys.stderr)
+    summary = write_export(ExportRequest(args.source, args.out, args.to, **some, reading=tables_read(args)))
+    print(f"wrote {args.out}{summary}", file=sys.stderr)
     return 0

@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
         travel_time_columns,
     )
     from jeat_graph.corridor.handover import chain, hand_over
-    from jeat_graph.corridor.passage_looks import check_looks, with_looks
+    from jeat_graph.corridor.passage_appearance import check_appearance, with_appearance
     from jeat_graph.corridor.passages import read_passages
     from jeat_graph.io.files.outputs import check_folder
     from jeat_graph.io.tables.table_writer import write_columns
@@ -130,8 +130,8 @@ def run(args: argparse.Namespace) -> int:
     cameras = {
         name: read_passages(folder, name, lines.get(name), ways.get(name)) for name, folder in args.cameras
     }
-    cameras |= {name: with_looks(cameras[name], run) for name, run in runs.items()}
-    check_looks([cameras[name] for name in order])
+    cameras |= {name: with_appearance(cameras[name], run) for name, run in runs.items()}
+    check_appearance([cameras[name] for name in order])
     gaps = sorted(gaps, key=lambda gap: order.index(gap.first))
     corridor = Corridor.of(order, cameras, hand_over(gaps, cameras))
     for over in corridor.handovers:
@@ -163,16 +163,16 @@ def _sentence(over: Handover) -> str:
         f"{a.camera}-{b.camera}: {len(over.first)} of {len(a)} vehicles are among the {len(b)} at "
         f"{b.camera}, {p.distance_m:.0f} m on; clock {p.offset_s:.3f} ± {sd:.3f} s ahead (peak "
         f"{over.peak.height:.0f} robust deviations, next {over.peak.runner_up:.0f}); travel times spread by "
-        f"{100.0 * p.spread:.1f} %{_of_looks(over)}"
+        f"{100.0 * p.spread:.1f} %{_of_appearance(over)}"
     )
 
 
-def _of_looks(over: Handover) -> str:
+def _of_appearance(over: Handover) -> str:
     """Say how well embeddings tell vehicles apart, where there are some."""
-    if over.fitted.gap.looks is None:
+    if over.fitted.gap.appearance is None:
         return ""
-    looks = over.fitted.parameters.looks
-    return f"; embeddings tell vehicles apart by d′ {0.0 if looks is None else looks.d_prime:.1f}"
+    appearance = over.fitted.parameters.appearance
+    return f"; embeddings tell vehicles apart by d′ {0.0 if appearance is None else appearance.d_prime:.1f}"
 
 
 def _gaps(args: argparse.Namespace) -> list[KnownGap]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
-from jeat_graph.cli.detect_options import DEFAULT, add_looking
+from jeat_graph.cli.detect_options import DEFAULT, add_detector_options
 from jeat_graph.config.argument_types import positive
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def add_cameras(parser: argparse.ArgumentParser) -> None:
     add("--frames", metavar="CAMERA", help=f"a frame camera: {CAMERAS}")
     add("--events", metavar="CAMERA", help=f"an event camera: {EVENT_CAMERAS}")
     add_duration(group)
-    add_looking(group)
+    add_detector_options(group)
 
 
 def opened_cameras(

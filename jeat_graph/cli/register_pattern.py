@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".webm", ".m4v")
 # Pictures that are looked at of a video or of events in which the pattern stands still, and how long events
 # are counted for each (µs).
-_LOOKS, _WINDOW_US = 12, 250_000
+_SAMPLED, _WINDOW_US = 12, 250_000
 
 
 def named_path(text: str) -> tuple[str, str]:
@@ -102,7 +102,7 @@ def map_of_pattern(args: argparse.Namespace, reference: str | None) -> PatternMa
     names.sort(key=lambda name: reference is not None and name != reference)
     given = dict(args.sensor_image)
     seen = [
-        [one for other, path in args.view if other == name for one in _look(path, pattern, given.get(name))]
+        [one for other, path in args.view if other == name for one in _views(path, pattern, given.get(name))]
         for name in names
     ]
     sizes = [_one_size(views) for views in seen]
@@ -157,7 +157,7 @@ def _one_size(views: Sequence[_Seen]) -> tuple[int, int]:
     return views[0].size
 
 
-def _look(path: str, pattern: Pattern, size_px: tuple[int, int] | None) -> Iterator[_Seen]:
+def _views(path: str, pattern: Pattern, size_px: tuple[int, int] | None) -> Iterator[_Seen]:
     """Corners of each place that a path shows; the size is for files of events that do not say theirs."""
     from jeat_graph.io.media.decoders import PICTURES
     from jeat_graph.io.media.picture_file import read_picture
@@ -176,7 +176,7 @@ def _look(path: str, pattern: Pattern, size_px: tuple[int, int] | None) -> Itera
         yield _Seen(path, size, corners_of_place([picture[..., ::-1]], pattern, path))
     elif suffix in _VIDEOS:
         with open_frames(place, rate_hz=1.0) as frames:
-            chosen = np.unique(np.linspace(0, len(frames) - 1, _LOOKS).round().astype(np.int64))
+            chosen = np.unique(np.linspace(0, len(frames) - 1, _SAMPLED).round().astype(np.int64))
             pictures = (frames.frame(int(k)) for k in chosen)
             yield _Seen(path, frames.size_px, corners_of_place(pictures, pattern, path))
     else:
@@ -199,7 +199,7 @@ def _counted(path: Path, size_px: tuple[int, int] | None) -> tuple[tuple[int, in
             raise DataError(
                 "does not say the size of its picture: give it with --sensor-image NAME=WxH", path
             )
-        windows = np.zeros((_LOOKS + 1, size[1] * size[0]), dtype=np.int64)
+        windows = np.zeros((_SAMPLED + 1, size[1] * size[0]), dtype=np.int64)
         start = None
         for piece in reader.pieces():
             if not len(piece):
@@ -207,10 +207,10 @@ def _counted(path: Path, size_px: tuple[int, int] | None) -> tuple[tuple[int, in
             start = int(piece.t_us[0]) if start is None else start
             inside = (piece.x < size[0]) & (piece.y < size[1])
             pixel = (piece.y.astype(np.int64) * size[0] + piece.x)[inside]
-            window = np.minimum((piece.t_us[inside] - start) // _WINDOW_US, _LOOKS)
+            window = np.minimum((piece.t_us[inside] - start) // _WINDOW_US, _SAMPLED)
             for k in np.unique(window):
                 windows[k] += np.bincount(pixel[window == k], minlength=windows.shape[1])
     if start is None:
         raise DataError("holds no events", path)
-    pictures = [windows.sum(axis=0), *(one for one in windows[:_LOOKS] if one.any())]
+    pictures = [windows.sum(axis=0), *(one for one in windows[:_SAMPLED] if one.any())]
     return size, [picture_of_counts(one.reshape(size[1], size[0])) for one in pictures]

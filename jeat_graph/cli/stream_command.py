@@ -367,7 +367,7 @@ def _take(
 
 
 def _skip(session: Session) -> Callable[[DataError], None]:
-    from jeat_graph.live.told import BadLines
+    from jeat_graph.live.session_warnings import BadLines
 
     lines = BadLines(_say)
 

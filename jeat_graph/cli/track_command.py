@@ -195,7 +195,7 @@ def _detected(args: argparse.Namespace) -> DetectedFile:
         out,
         declare=args.config == DEFAULT,
         say=_say,
-        detect=lambda looked: detect_with_bar(looked, "track"),
+        detect=lambda asked: detect_with_bar(asked, "track"),
     )
     args.image = args.image or (None if args.rig is not None else found.image)
     return found
@@ -245,8 +245,8 @@ def _take_picture_of(camera: RoadCamera, args: argparse.Namespace) -> None:
         _say(f"picture of {size[0]} x {size[1]} px, as {args.camera} says")
         args.image = size
     elif size != (config.image.width, config.image.height):
-        said = f"{config.image.width:g} x {config.image.height:g}"
-        raise DataError(f"is of a picture of {size[0]} x {size[1]} px, not of {said}", args.camera)
+        picture = f"{config.image.width:g} x {config.image.height:g}"
+        raise DataError(f"is of a picture of {size[0]} x {size[1]} px, not of {picture}", args.camera)
 
 
 def _road_tables(camera: RoadCamera) -> Callable[[Path, Config], None]:

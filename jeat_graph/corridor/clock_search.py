@@ -69,7 +69,7 @@ def find_offset(gap: Gap, distance_m: float, within_s: tuple[float, float]) -> P
     width = sigma / _BINS_A_SIGMA
     margin = _BACKGROUND_SIGMAS * sigma
     low, high = within_s[0] - margin, within_s[1] + margin
-    weight = _alike(gap, rows, columns)
+    weight = _similarity(gap, rows, columns)
     bins = max(math.ceil((high - low) / width), 1)
     inside = (offset >= low) & (offset < high)
     votes = np.bincount(
@@ -111,7 +111,7 @@ def _some(count: int) -> np.ndarray:
     return np.arange(start, min(start + _MOST_VEHICLES, count))
 
 
-def _alike(gap: Gap, rows: np.ndarray, columns: np.ndarray) -> FloatArray:
+def _similarity(gap: Gap, rows: np.ndarray, columns: np.ndarray) -> FloatArray:
     """Weight (A, B) of each pair by speeds and lengths: their likelihood ratio over one plus it."""
     z_i, z_j = gap.own_before[rows][:, None], gap.own_after[columns][None]
     spread = max(float(gap.own_after.std()), 1e-3)

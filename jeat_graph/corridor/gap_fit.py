@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from jeat_graph.association.matching_marginals import MatchingMarginals, matching_marginals
+from jeat_graph.corridor.appearance import learn_appearance
 from jeat_graph.corridor.gap_model import (
     Gap,
     GapParameters,
@@ -23,13 +24,12 @@ from jeat_graph.corridor.gap_model import (
     table_of,
     within,
 )
-from jeat_graph.corridor.looks import learn_looks
 from jeat_graph.corridor.shared_slowness import Slowness, by_lane, pooled
 from jeat_graph.data.arrays import FloatArray
 
 _ROUNDS = 40
 #: What vehicles look like is learnt so many times, each with better times of the gap.
-_LOOKS_LEARNT = 2
+_APPEARANCE_ROUNDS = 2
 _TOLERANCE = 1e-4
 #: Priors, each a mean with its standard deviation: of the speeds' weights, and of the mean slowness, which
 #: holds the errors of both cameras' scales too.
@@ -101,7 +101,7 @@ def fit_gap(gap: Gap, prior: Prior, offset_s: float, rounds: int = _ROUNDS) -> F
     slowness, shared = np.zeros(a), Slowness(np.zeros(a), 0.0, 60.0)
     covariance = np.zeros((2, 2))
     done, learnt = rounds, 0
-    for k in range((1 + _LOOKS_LEARNT) * rounds):
+    for k in range((1 + _APPEARANCE_ROUNDS) * rounds):
         pairs = candidate_pairs(gap, p, slowness)
         times = pair_times(gap, pairs, p, slowness)
         ratio = log_ratios(gap, pairs, p, slowness, times)
@@ -109,18 +109,18 @@ def fit_gap(gap: Gap, prior: Prior, offset_s: float, rounds: int = _ROUNDS) -> F
         old = p
         p, slowness, shared, covariance = _improved(gap, pairs, marginals.pair, p, slowness, times, prior)
         if _change(old, p) < _TOLERANCE or k + 1 == done:
-            if gap.looks is None or learnt == _LOOKS_LEARNT:
+            if gap.appearance is None or learnt == _APPEARANCE_ROUNDS:
                 break
             # By matches that times, lanes and lengths decide alone; again when these are known better.
             cosine = gap.cosines(pairs)
-            if p.looks is not None:
-                marginals = matching_marginals(pairs.i, pairs.j, ratio - p.looks.log_ratio(cosine), a, b)
+            if p.appearance is not None:
+                marginals = matching_marginals(pairs.i, pairs.j, ratio - p.appearance.log_ratio(cosine), a, b)
             p, learnt, done = (
-                replace(p, looks=learn_looks(cosine, marginals.pair)),
+                replace(p, appearance=learn_appearance(cosine, marginals.pair)),
                 learnt + 1,
                 k + 1 + rounds,
             )
-            if p.looks is None:
+            if p.appearance is None:
                 break
     pairs = candidate_pairs(gap, p, slowness)
     ratio = log_ratios(gap, pairs, p, slowness, pair_times(gap, pairs, p, slowness))

@@ -5,7 +5,7 @@ Of the pair of passage i at camera A and j at camera B the log ratio is
     ln [ m q_i p(v_j | v_i) p(t_j | t_i, v_i, v_j) p(lane_j | lane_i) p(length_j | length_i)
          p(class_j | class_i) ] − ln [ (1 − m q_i) β p(v_j) p(lane_j) p(length_j) p(class_j) ],
 
-and what their looks say, where there are embeddings (`looks`);
+and what their looks say, where there are embeddings (`appearance`);
 m the share of A's vehicles that reach B, q_i the probability that i would pass within B's recording, β the
 rate of B's vehicles that do not come from A. With z the ln of the speed less that of the traffic at this
 time and lane, and μ that of the traffic,
@@ -28,7 +28,7 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import gaussian_kde
 
-from jeat_graph.corridor.looks import LookModel, centred
+from jeat_graph.corridor.appearance import AppearanceModel, centred
 from jeat_graph.corridor.passages import Passages
 from jeat_graph.data.arrays import FloatArray, IntArray
 
@@ -64,7 +64,7 @@ class GapParameters:
         rate: β (1/s).
         lanes: p(lane_j | lane_i) over p(lane_j).
         kinds: p(class_j | class_i) over p(class_j).
-        looks: how alike vehicles look; None where that is not known, or tells nothing.
+        appearance: how alike vehicles look; None where that is not known, or tells nothing.
     """
 
     offset_s: float
@@ -80,7 +80,7 @@ class GapParameters:
     rate: float = 0.05
     lanes: FloatArray | None = None
     kinds: FloatArray | None = None
-    looks: LookModel | None = None
+    appearance: AppearanceModel | None = None
 
 
 def traffic_speed(passages: Passages) -> FloatArray:
@@ -135,16 +135,16 @@ class Gap:
         return out
 
     @cached_property
-    def looks(self) -> tuple[FloatArray, FloatArray] | None:
+    def appearance(self) -> tuple[FloatArray, FloatArray] | None:
         """Embeddings (A, E) and (B, E) less their camera's mean, of unit length; None if a side has none."""
-        before, after = self.before.looks, self.after.looks
+        before, after = self.before.appearance, self.after.appearance
         return None if before is None or after is None else (centred(before), centred(after))
 
     def cosines(self, pairs: PassagePairs) -> FloatArray:
         """Return the cosines (E,) of the embeddings of pairs, NaN where one has none."""
-        if self.looks is None:
+        if self.appearance is None:
             return np.full(len(pairs), np.nan)
-        before, after = self.looks
+        before, after = self.appearance
         found = [
             np.einsum("ek,ek->e", before[pairs.i[k : k + _AT_ONCE]], after[pairs.j[k : k + _AT_ONCE]])
             for k in range(0, len(pairs), _AT_ONCE)
@@ -270,8 +270,8 @@ def log_ratios(
     out += _speed_ratio(gap, pairs, p) + _length_ratio(gap, pairs, p)
     out += _table_ratio(gap.before.lane[i], gap.after.lane[j], p.lanes)
     out += _table_ratio(gap.before.kind[i], gap.after.kind[j], p.kinds)
-    if p.looks is not None:
-        out += p.looks.log_ratio(gap.cosines(pairs))
+    if p.appearance is not None:
+        out += p.appearance.log_ratio(gap.cosines(pairs))
     return np.asarray(out)
 
 

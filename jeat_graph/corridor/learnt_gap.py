@@ -99,8 +99,8 @@ def learnt_gap(tree: Mapping[str, Any], path: str | Path) -> LearntGap:
     if not isinstance(model, Mapping):
         raise DataError(f"{name}: has no model; `jeat-graph handover` writes it", path)
     try:
-        told = {**tree, **model}
-        numbers = {key: float(told[key]) for key in (*_PARAMETERS, *_OTHERS)}
+        merged = {**tree, **model}
+        numbers = {key: float(merged[key]) for key in (*_PARAMETERS, *_OTHERS)}
         weights = float(model["weights"][0]), float(model["weights"][1])
         variance = float(tree["covariance"][0][0])
         lanes, lane_names = _table(model.get("lane_ratios"))
@@ -119,7 +119,7 @@ def learnt_gap(tree: Mapping[str, Any], path: str | Path) -> LearntGap:
         weights=weights,
         lanes=lanes,
         kinds=kinds,
-        looks=None,  # vehicles that are followed while they drive have none
+        appearance=None,  # vehicles that are followed while they drive have none
         **{key: numbers[key] for key in _PARAMETERS},
     )
     even = numbers["slowness_sd"] < _LEAST_SLOWNESS_SD

@@ -75,7 +75,7 @@ class LiveCorridor:
         offsets = [gap.parameters.offset_s for gap in gaps]
         self._clock_s = [sum(offsets[:k]) for k in range(len(self.order))]
         self._now = [-math.inf] * len(self.order)
-        self._told: list[dict[int, float]] = [{} for _ in self.order]
+        self._reported: list[dict[int, float]] = [{} for _ in self.order]
         self._times = [_Times() for _ in gaps]
         self._ended: dict[int, Counter[tuple[str, str]]] = {}
         self._next_identity = 1
@@ -91,13 +91,13 @@ class LiveCorridor:
     def passed(self, camera: str, passage: LivePassage) -> bool:
         """Take in a vehicle at a camera's line; whether it is new: after a fault some are told again."""
         k = self.order.index(camera)
-        told = self._told[k]
-        if abs(told.get(passage.track_id, -math.inf) - passage.t) < _SAME_S:
+        reported = self._reported[k]
+        if abs(reported.get(passage.track_id, -math.inf) - passage.t) < _SAME_S:
             return False
-        told.pop(passage.track_id, None)
-        told[passage.track_id] = passage.t
-        while len(told) > _MOST_REMEMBERED:
-            del told[next(iter(told))]
+        reported.pop(passage.track_id, None)
+        reported[passage.track_id] = passage.t
+        while len(reported) > _MOST_REMEMBERED:
+            del reported[next(iter(reported))]
         self.passages[camera] += 1
         if k:
             self._gaps[k - 1].arrive(passage)
@@ -112,10 +112,10 @@ class LiveCorridor:
         for k, gap in enumerate(self._gaps):
             second = self._now[k + 1]
             if math.isfinite(until) or math.isfinite(second):
-                arrived, gone = gap.decide(until, second)
+                arrived, departed = gap.decide(until, second)
                 for one in arrived:
                     events += self._arrived(k, one)
-                for traveller in gone:
+                for traveller in departed:
                     self._ends(traveller, k)
                 events += self._closed(k, until)
             until = gap.until(second)
@@ -275,7 +275,7 @@ class LiveCorridor:
             "order": self.order,
             "interval_s": self._interval_s,
             "now": [t if math.isfinite(t) else None for t in self._now],
-            "told": [list(map(list, told.items())) for told in self._told],
+            "reported": [list(map(list, reported.items())) for reported in self._reported],
             "gaps": [gap.state() for gap in self._gaps],
             "times": [
                 {
@@ -303,7 +303,7 @@ class LiveCorridor:
         if state["order"] != self.order or state["interval_s"] != self._interval_s:
             raise ValueError("is of other cameras, or of another interval")
         self._now = [-math.inf if t is None else t for t in state["now"]]
-        self._told = [{int(k): float(t) for k, t in told} for told in state["told"]]
+        self._reported = [{int(k): float(t) for k, t in reported} for reported in state["reported"]]
         for gap, one in zip(self._gaps, state["gaps"], strict=True):
             gap.set_state(one)
         for times, one in zip(self._times, state["times"], strict=True):

@@ -107,11 +107,11 @@ class Decided(NamedTuple):
 
     Attributes:
         arrived: at the second camera, in order of time.
-        gone: vehicles that are on the way no longer: they left, or were missed.
+        departed: vehicles that are on the way no longer: they left, or were missed.
     """
 
     arrived: list[Arrived]
-    gone: list[Traveller]
+    departed: list[Traveller]
 
 
 class _LiveWindow(NamedTuple):
@@ -170,12 +170,12 @@ class LiveGap:
         due += [True] * max(len(due) - _MOST_OPEN, 0)
         arrived = self._settled(due[: len(self._waiting)], second_now) if any(due) else []
         kept: list[Traveller] = []
-        gone: list[Traveller] = []
+        departed: list[Traveller] = []
         for one in self.on_way:
-            (gone if self._is_gone(one.passage, first_until, second_now) else kept).append(one)
+            (departed if self._has_departed(one.passage, first_until, second_now) else kept).append(one)
         over = max(len(kept) - _MOST_OPEN, 0)
-        self.on_way, gone = kept[over:], gone + kept[:over]
-        return Decided(arrived, gone)
+        self.on_way, departed = kept[over:], departed + kept[:over]
+        return Decided(arrived, departed)
 
     def travel_s(self, log_speed: float) -> float:
         """Return the travel time (s) that a speed (ln of m/s) leads to, as vehicles travel now."""
@@ -188,7 +188,7 @@ class LiveGap:
         latest_start = one.t - p.offset_s - travel * math.exp(-_SPREADS * p.spread)
         return first_until >= latest_start or second_now >= one.t + _HOLD_S
 
-    def _is_gone(self, one: LivePassage, first_until: float, second_now: float) -> bool:
+    def _has_departed(self, one: LivePassage, first_until: float, second_now: float) -> bool:
         p = self.learnt.parameters
         longest = p.distance_m * math.exp(
             max(self.slowness_now, self.learnt.slowness) + WINDOW - one.log_speed

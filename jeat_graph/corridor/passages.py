@@ -52,7 +52,7 @@ class Passages:
         kinds: names of the classes.
         span_s: begin and end of the recording (s).
         left_out: identities that are not among these, each with the reason.
-        looks: (N, E) what each looks like, NaN where that is not known; or None.
+        appearance: (N, E) what each looks like, NaN where that is not known; or None.
     """
 
     camera: str
@@ -70,7 +70,7 @@ class Passages:
     kinds: tuple[str, ...]
     span_s: tuple[float, float]
     left_out: tuple[tuple[int, str], ...] = ()
-    looks: FloatArray | None = None
+    appearance: FloatArray | None = None
 
     def __len__(self) -> int:
         """Number of vehicles."""
@@ -153,8 +153,8 @@ def _going(table: FileTable, here: np.ndarray, direction: str | None, path: Path
         return np.asarray(ways == direction)
     names, counts = np.unique(ways[here], return_counts=True)
     if counts.min() > _OTHER_WAY_SHARE * counts.sum() and len(names) > 1:
-        told = ", ".join(f"{n} to the {name}" for name, n in zip(names, counts, strict=True))
-        raise DataError(f"its line is crossed both ways ({told}): say --direction CAMERA=left or right", path)
+        both = ", ".join(f"{n} to the {name}" for name, n in zip(names, counts, strict=True))
+        raise DataError(f"its line is crossed both ways ({both}): say --direction CAMERA=left or right", path)
     return np.asarray(ways == names[np.argmax(counts)])
 
 
@@ -162,20 +162,20 @@ def _without_fragments(
     track_id: IntArray, t: FloatArray, kmh: FloatArray, lane: np.ndarray, sigma_speed: FloatArray
 ) -> tuple[IntArray, list[tuple[int, str]]]:
     """Keep one of two tracks that pass in one lane at one time with one speed: the one that is surer."""
-    gone: dict[int, int] = {}
+    replaced: dict[int, int] = {}
     for k in range(1, len(t)):
         for other in range(k - 1, -1, -1):
             if t[k] - t[other] > _SAME_VEHICLE_S:
                 break
-            alike = lane[k] == lane[other] and abs(np.log(kmh[k] / kmh[other])) < _SAME_SPEED
-            if alike and other not in gone:
+            similar = lane[k] == lane[other] and abs(np.log(kmh[k] / kmh[other])) < _SAME_SPEED
+            if similar and other not in replaced:
                 worse, better = (k, other) if sigma_speed[k] >= sigma_speed[other] else (other, k)
-                gone[worse] = better
+                replaced[worse] = better
                 break
-    keep = np.array([k for k in range(len(t)) if k not in gone], dtype=np.int64)
+    keep = np.array([k for k in range(len(t)) if k not in replaced], dtype=np.int64)
     return keep, [
         (int(track_id[k]), f"passes with {int(track_id[b])}, as a second track of one vehicle does")
-        for k, b in gone.items()
+        for k, b in replaced.items()
     ]
 
 

@@ -77,11 +77,11 @@ def motions_of_scans(rows: FloatArray | None, scan_of_row: IntArray, count: int)
     """
     if rows is None:
         return None
-    told = np.flatnonzero(~np.isnan(rows[:, 0]))
-    if not len(told):
+    known = np.flatnonzero(~np.isnan(rows[:, 0]))
+    if not len(known):
         return None
     out = np.full((count, MOTION_NUMBERS), np.nan)
-    out[scan_of_row[told]] = rows[told]
+    out[scan_of_row[known]] = rows[known]
     return out
 
 

@@ -71,7 +71,7 @@ def all_numbers(texts: Iterable[str]) -> bool:
     return bool(there) and all(_WHOLE.fullmatch(text) for text in there)
 
 
-def said_classes(found: Mapping[str, TextArray]) -> TextArray | None:
+def declared_classes(found: Mapping[str, TextArray]) -> TextArray | None:
     """Choose among columns that say classes: names go before numbers, as in tables of YOLO's that have both.
 
     Args:
@@ -80,10 +80,12 @@ def said_classes(found: Mapping[str, TextArray]) -> TextArray | None:
     Returns:
         Classes (N,), numbers without decimals; None where no column says them.
     """
-    said = next((found[name] for name in CLASS_COLUMNS[:2] if name in found), None)
-    if said is None or not all_numbers(set(said.tolist())):  # a set takes a fraction of a sort's time
-        return said
-    names, place = np.unique(said, return_inverse=True)
+    found_column = next((found[name] for name in CLASS_COLUMNS[:2] if name in found), None)
+    if found_column is None or not all_numbers(
+        set(found_column.tolist())
+    ):  # a set takes a fraction of a sort's time
+        return found_column
+    names, place = np.unique(found_column, return_inverse=True)
     whole = [_WHOLE.sub(r"\1", name) for name in names.tolist()]
     numbers: TextArray = np.array(whole, dtype=np.str_)[place.reshape(-1)]
     if "name" not in found:

@@ -69,9 +69,9 @@ class DetectionViews:
         columns["score"] = scores
         if self.classes is not None:
             columns["class"] = classes
-        looks = self.embedding_rows()
-        if looks is not None:
-            columns["embedding"] = looks
+        vectors = self.embedding_rows()
+        if vectors is not None:
+            columns["embedding"] = vectors
         motions = self.motion_rows()
         if motions is not None:
             columns[CAMERA_MOTION] = motions

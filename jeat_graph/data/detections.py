@@ -96,11 +96,11 @@ class Detections(DetectionViews):
             raise DataError(f"row {np.arange(len(time))[rows][bad[0]]}: {bad[1]}")
         sensors, code = np.unique(names, return_inverse=True)
         kinds = None if classes is None else class_texts(classes, len(time)).copy()
-        looks = None if embeddings is None else unit_embeddings(embeddings, len(time))
+        vectors = None if embeddings is None else unit_embeddings(embeddings, len(time))
         if camera_motion is not None and bad_motions(camera_motion).any():
             raise DataError(f"row {int(np.argmax(bad_motions(camera_motion)))}: camera_motion is none")
         return Detections.from_checked(
-            time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap, looks, camera_motion
+            time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap, vectors, camera_motion
         )
 
     @staticmethod
@@ -182,10 +182,10 @@ class Detections(DetectionViews):
         columns = [np.concatenate(column) for column in zip(*rows, strict=True)]
         has_class = any(part.classes is not None for part in parts)
         t, sensor, boxes, scores, empty, classes = columns
-        looks = [part.embedding_rows() for part in parts]
+        vectors = [part.embedding_rows() for part in parts]
         whole = Detections.from_rows(
             *(t, sensor, boxes, scores, empty, classes if has_class else None),
-            join_embeddings(looks, [len(t) for t, *_ in rows]),
+            join_embeddings(vectors, [len(t) for t, *_ in rows]),
             join_motions([part.motion_rows() for part in parts], [len(t) for t, *_ in rows]),
         )
         return replace(whole, dropped=sum(part.dropped for part in parts))

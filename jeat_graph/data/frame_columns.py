@@ -11,7 +11,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, TextArray
 from jeat_graph.data.box_text import KNOWN, sides_of
 from jeat_graph.data.boxes import class_texts
-from jeat_graph.data.class_columns import CLASS_COLUMNS, said_classes
+from jeat_graph.data.class_columns import CLASS_COLUMNS, declared_classes
 from jeat_graph.data.column_names import BOX, BOX_TEXT, sides_to_boxes, standing_in, usual_names
 from jeat_graph.data.errors import DataError
 
@@ -88,7 +88,7 @@ def detector_columns(table: Any) -> tuple[FloatArray, FloatArray | None, Any]:
 def classes_of_columns(columns: Mapping[str, Any], count: int) -> TextArray | None:
     """Return classes (R,) of columns from `named_columns`: names before numbers; None without any."""
     found = {name: class_texts(columns[name], count) for name in CLASS_COLUMNS if name in columns}
-    return said_classes(found)
+    return declared_classes(found)
 
 
 def _boxes_in_one_field(column: Any) -> FloatArray:

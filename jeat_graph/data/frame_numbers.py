@@ -24,21 +24,21 @@ _NUMBER = re.compile(r"\d+(?!.*\d)", re.DOTALL)
 _MOST_DIGITS = 15
 
 
-def first_frame(frames: IntArray | FloatArray, said: int | None = None) -> int:
+def first_frame(frames: IntArray | FloatArray, given: int | None = None) -> int:
     """Return the number of a recording's first frame.
 
     Args:
         frames: (R,) numbers that occur.
-        said: what the user says, or None.
+        given: what the user says, or None.
 
     Raises:
-        DataError: `said` is neither 0 nor 1.
+        DataError: `given` is neither 0 nor 1.
     """
-    if said is None:
+    if given is None:
         return 0 if len(frames) and np.nanmin(frames) == 0 else 1
-    if said not in FIRST_FRAMES:
-        raise DataError(f"frames count from 0 or 1, not from {said}")
-    return said
+    if given not in FIRST_FRAMES:
+        raise DataError(f"frames count from 0 or 1, not from {given}")
+    return given
 
 
 class FrameCount(NamedTuple):
@@ -73,15 +73,15 @@ class FrameCount(NamedTuple):
         return self.first == 0 if self.fixed else self.lowest == 0
 
 
-def note_first(title: str, count: FrameCount | None, said: int | None = None) -> None:
+def note_first(title: str, count: FrameCount | None, given: int | None = None) -> None:
     """Say from which number a file was taken to count, where nobody said it and it is not the usual one.
 
     Args:
         title: what the file is called.
         count: its frame numbers; None of one that has times.
-        said: what the user said.
+        given: what the user said.
     """
-    if count is None or said is not None or count.fixed or count.usual in (None, count.first):
+    if count is None or given is not None or count.fixed or count.usual in (None, count.first):
         return
     if count.from_0:
         note(f"{title}: frames count from 0, for there is a frame 0")

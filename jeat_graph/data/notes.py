@@ -30,11 +30,11 @@ def listening(say: Callable[[str], object]) -> Iterator[None]:
     Args:
         say: called with each new note.
     """
-    said: set[str] = set()
+    seen: set[str] = set()
 
     def once(text: str) -> None:
-        if text not in said:
-            said.add(text)
+        if text not in seen:
+            seen.add(text)
             say(text)
 
     token = _listener.set(once)

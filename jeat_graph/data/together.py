@@ -34,13 +34,13 @@ class Reader(Generic[Content]):
 
 
 def read_together(
-    readers: Sequence[Reader[Content]], said: int | None = None, truth: int | None = None
+    readers: Sequence[Reader[Content]], given: int | None = None, truth: int | None = None
 ) -> tuple[list[Content], list[FrameCount | None]]:
     """Read files of one recording.
 
     Args:
         readers: of the files.
-        said: the first frame that the user says, of the files where it can be; one that has a frame 0 counts
+        given: the first frame that the user says, of the files where it can be; one that has a frame 0 counts
             from 0 beside others that have none.
         truth: which of them is the truth that the others are judged by, or None.
 
@@ -51,43 +51,43 @@ def read_together(
     found = [reader.read(None) for reader in readers]
     counts = [count for _, count in found]
     firsts = first_frames(counts, truth)
-    if said is not None:
+    if given is not None:
         fixed = all(count is None or count.fixed for count in counts)
-        firsts = [None if count is None else _as_said(count, said, fixed) for count in counts]
-        if said not in firsts and any(first is not None for first in firsts):
+        firsts = [None if count is None else _as_given(count, given, fixed) for count in counts]
+        if given not in firsts and any(first is not None for first in firsts):
             for reader in readers:
-                reader.read(said)  # says what is wrong with it
+                reader.read(given)  # says what is wrong with it
     contents = [content for content, _ in found]
     for k, (reader, count, first) in enumerate(zip(readers, counts, firsts, strict=True)):
         if count is not None and first != count.first and not reader.settled:
             contents[k] = reader.read(first)[0]
-    _say([reader.title for reader in readers], counts, firsts, said, truth)
+    _say([reader.title for reader in readers], counts, firsts, given, truth)
     decided = zip(counts, firsts, strict=True)
     return contents, [
         None if count is None or first is None else count._replace(first=first) for count, first in decided
     ]
 
 
-def _as_said(count: FrameCount, said: int, fixed: bool) -> int:
+def _as_given(count: FrameCount, given: int, fixed: bool) -> int:
     """As said, where no number is below it and the format, or that of some file, leaves it open."""
-    return count.first if count.lowest < said or (count.fixed and not fixed) else said
+    return count.first if count.lowest < given or (count.fixed and not fixed) else given
 
 
 def _say(
     titles: Sequence[str],
     counts: Sequence[FrameCount | None],
     firsts: Sequence[int | None],
-    said: int | None,
+    given: int | None,
     truth: int | None,
 ) -> None:
     """Say in one line from which number frames count, where a user might think otherwise."""
     counted = [k for k, count in enumerate(counts) if count is not None]
     by_first = {first: [titles[k] for k in counted if firsts[k] == first] for first in (0, 1)}
     if by_first[0] and by_first[1]:
-        told = " and ".join(f"from {first} in {', '.join(names)}" for first, names in by_first.items())
-        note(f"frames count {told}" + (" (--first-frame says otherwise)" if said is None else ""))
+        text = " and ".join(f"from {first} in {', '.join(names)}" for first, names in by_first.items())
+        note(f"frames count {text}" + (" (--first-frame says otherwise)" if given is None else ""))
         return
-    if said is not None:
+    if given is not None:
         return
     for k in counted:
         count = counts[k]

@@ -125,13 +125,13 @@ class Trajectories(TrajectoryViews):
         if all(part.causal_id is not None for part in filled):
             stacked |= {name: np.concatenate([getattr(part, name) for part in filled]) for name in DECIDED}
         known = [part.instants for part in parts if len(part) or part.instants is not None]
-        told = [at for at in known if at is not None]
+        given = [at for at in known if at is not None]
         return Trajectories(
             **stacked,
             sensors=parts[0].sensors,
             classes=classes,
             class_probability=probability,
-            instants=np.unique(np.concatenate(told)) if told and len(told) == len(known) else None,
+            instants=np.unique(np.concatenate(given)) if given and len(given) == len(known) else None,
             class_ids=ids or None,
         )
 

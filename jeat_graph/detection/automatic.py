@@ -35,8 +35,8 @@ from jeat_graph.io.media.video import FrameSource, RgbImage
 #: The network of the package that is tried: it knows highways.
 HIGHWAYS = "sehn"
 #: How much of a recording is looked at (s), pictures for what moves there, and those that networks look at.
-LOOK_S = 3.0
-PICTURES, _LOOKS = 25, 6
+SAMPLE_S = 3.0
+PICTURES, _SAMPLED = 25, 6
 #: A box is sound if this share of it moves, or from this score on.
 _MOVING, _SURE = 0.3, 0.5
 #: A network is trusted if this share of its boxes is sound, it has so many a picture, and sees this share of
@@ -129,12 +129,12 @@ def chosen_by(
         ConfigError: classes are asked for that nothing here knows.
     """
     moving = _moving(frames, times_s, settings.frames)
-    looks = np.unique(np.linspace(0, len(frames) - 1, min(_LOOKS, len(frames))).round().astype(int))
-    pictures = [(frames[k], moving[k]) for k in looks.tolist()]
+    sampled = np.unique(np.linspace(0, len(frames) - 1, min(_SAMPLED, len(frames))).round().astype(int))
+    pictures = [(frames[k], moving[k]) for k in sampled.tolist()]
     found = []
-    for name, look, accuracy in _candidates(settings, say):
+    for name, model, accuracy in _candidates(settings, say):
         try:
-            found.append(_impression(name, look, accuracy, pictures))
+            found.append(_impression(name, model, accuracy, pictures))
         except DataError as error:  # a network that does not work here is none
             say(str(error))
     anything_moves = any(len(boxes) for boxes in moving)
@@ -146,7 +146,7 @@ def chosen_by(
     tried = "; ".join(str(one) for one in found) or "no network of road users is on this machine"
     if anything_moves or any(one.trusted for one in found):
         convinced(chosen)
-    say(f"detector: {chosen}, by the first {LOOK_S:g} s ({tried}); --detector-frames NAME takes another")
+    say(f"detector: {chosen}, by the first {SAMPLE_S:g} s ({tried}); --detector-frames NAME takes another")
     return chosen
 
 
@@ -171,7 +171,7 @@ def choose_among(found: Sequence[Impression], anything_moves: bool) -> str:
 
 def _first(source: FrameSource) -> tuple[list[RgbImage], FloatArray]:
     """Return pictures of the first seconds and their times (s)."""
-    count = int(np.searchsorted(source.times_s, source.times_s[0] + LOOK_S, side="right"))
+    count = int(np.searchsorted(source.times_s, source.times_s[0] + SAMPLE_S, side="right"))
     chosen = np.unique(np.linspace(0, count - 1, min(PICTURES, count)).round().astype(int))
     return [source.frame(int(k)) for k in chosen], source.times_s[chosen]
 
@@ -217,15 +217,15 @@ def _candidates(
 
 def _impression(
     name: str,
-    look: ModelPictureDetector,
+    model: ModelPictureDetector,
     accuracy: float,
     pictures: Sequence[tuple[RgbImage, FloatArray]],
 ) -> Impression:
     boxes = sound = moves = 0
     seen = moved = 0.0
     for frame, moving in pictures:
-        scan = look(frame, 0.0)
-        likely = scan.scores >= (look.even_score or 0.0)
+        scan = model(frame, 0.0)
+        likely = scan.scores >= (model.even_score or 0.0)
         found, scores = scan.boxes[likely], scan.scores[likely]
         common = _common(found, moving)
         areas, mass = found[:, 2:].prod(axis=1), moving[:, 2:].prod(axis=1)
@@ -242,7 +242,7 @@ def _impression(
         seen / moved if moved else 1.0,
         accuracy,
         moves / boxes if boxes else 0.0,
-        look.tells_classes,
+        model.tells_classes,
     )
 
 

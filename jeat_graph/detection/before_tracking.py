@@ -61,7 +61,7 @@ def detect_before(
     found = out / DETECTIONS
     with hold_made_folder(out):  # detecting takes long; the run directory is held by what tracks
         detections = detect_files(request, say) if detect is None else detect(request)
-        write_detections(detections, found, said=known)
+        write_detections(detections, found, declared=known)
     return DetectedFile(str(found), image, request.detectors)
 
 
@@ -85,6 +85,6 @@ def detect_live_before(
     with hold_made_folder(out):
         scans = detect_live(request, say, until=until, prepared=lambda *what: known.append(what))
         detections = live_detections(scans, request)
-        [(looked, size_px)] = known
-        write_detections(detections, found, said=known_of(looked, say if declare else lambda _: None))
-    return DetectedFile(str(found), size_px, looked.detectors)
+        [(asked, size_px)] = known
+        write_detections(detections, found, declared=known_of(asked, say if declare else lambda _: None))
+    return DetectedFile(str(found), size_px, asked.detectors)

@@ -37,13 +37,13 @@ _EVERY, _SAME_LIGHT = 4, 0.01
 _MARGIN = 0.1
 # Degrees of freedom of t, reweightings, and the least error of a corner (px). Corners near each other err
 # alike, so many count for one, and all of them by so much (px): what interpolation between pixels costs.
-_DEGREES, _PASSES, _LEAST_ERROR_PX, _ALIKE, _COMMON_PX = 4.0, 4, 0.05, 4.0, 0.03
+_DEGREES, _PASSES, _LEAST_ERROR_PX, _CORRELATED, _COMMON_PX = 4.0, 4, 0.05, 4.0, 0.03
 # A camera moves if the corners of its picture do by more than this (px), and by so many standard deviations;
 # after that for so long (s) every motion is told.
 _STILL_PX, _STILL_DEVIATIONS, _MOVES_S = 0.1, 4.0, 5.0
 # A key picture is left when so few of its corners are found, when the picture has gone this share of its
 # width or grown so much, or after so long (s) where the picture is not where it was.
-_KEY_FOUND, _KEY_GONE, _KEY_GROWN, _KEY_S = 0.5, 0.15, 0.1, 10.0
+_KEY_FOUND, _KEY_MOVED, _KEY_GROWN, _KEY_S = 0.5, 0.15, 0.1, 10.0
 
 
 @dataclass(frozen=True)
@@ -117,11 +117,11 @@ class CameraFlow:
         if key is None or key.grey.shape != grey.shape or t <= before:
             self._begin(grey, seen, t)
             return scan
-        pose, found = self._look(key, grey, seen)
+        pose, found = self._find(key, grey, seen)
         if pose is None:
             self._begin(grey, seen, t)
             return scan
-        motion = self._told(pose, grey.shape, t, t - before)
+        motion = self._motion(pose, grey.shape, t, t - before)
         if self._leaves(pose, grey.shape, t - key.t, found):
             self._begin(grey, seen, t)
         return scan if motion is None else replace(scan, camera_motion=_in_picture(motion, scale))
@@ -146,7 +146,7 @@ class CameraFlow:
         self._key = _Key(grey, none if corners is None else np.asarray(corners, dtype=np.float32), t)
         self._pose = _KEY
 
-    def _look(self, key: _Key, grey: Grey, seen: BoolArray) -> tuple[Pose | None, int]:
+    def _find(self, key: _Key, grey: Grey, seen: BoolArray) -> tuple[Pose | None, int]:
         """Return the pose of a picture, None where it does not tell, and the number of corners found."""
         import cv2
 
@@ -171,7 +171,7 @@ class CameraFlow:
             return None, count
         return _fit(key.corners[good].reshape(-1, 2), there[good].reshape(-1, 2), grey.shape[1]), count
 
-    def _told(self, pose: Pose, shape: tuple[int, ...], t: float, span_s: float) -> FloatArray | None:
+    def _motion(self, pose: Pose, shape: tuple[int, ...], t: float, span_s: float) -> FloatArray | None:
         """Return the motion (11,) from the picture before to one of this pose (working px)."""
         if _is_moved(pose, shape):
             self._moves_until = t + _MOVES_S
@@ -199,7 +199,7 @@ class CameraFlow:
         """Whether another picture is to be the key picture from now on."""
         assert self._key is not None
         few = found < _KEY_FOUND * len(self._key.corners)
-        far = float(np.abs(_going(pose, shape)).max()) > _KEY_GONE * shape[1]
+        far = float(np.abs(_going(pose, shape)).max()) > _KEY_MOVED * shape[1]
         old = age_s > _KEY_S and self._pose is not _KEY
         return few or far or old or abs(pose.turn - 1.0) > _KEY_GROWN
 
@@ -236,8 +236,8 @@ def similarity(before: npt.NDArray[np.complex128], after: npt.NDArray[np.complex
         # Of one axis; two axes of N points less four unknowns.
         var = float(max((weight @ error2) / max(2.0 * len(before) - 4.0, 1.0), _LEAST_ERROR_PX**2))
         weight = (_DEGREES + 2.0) / (_DEGREES + error2 / var)
-    by_shift = _ALIKE * var / float(total) + _COMMON_PX**2
-    return Pose(turn, complex(to - turn * centre), complex(centre), (by_shift, _ALIKE * var / spread))
+    by_shift = _CORRELATED * var / float(total) + _COMMON_PX**2
+    return Pose(turn, complex(to - turn * centre), complex(centre), (by_shift, _CORRELATED * var / spread))
 
 
 def _going(pose: Pose, shape: tuple[int, ...]) -> npt.NDArray[np.complex128]:

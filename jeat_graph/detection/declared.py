@@ -23,7 +23,7 @@ from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.detection.models.recognising import layout_of, network_of, recognised
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.request import DetectRequest
-from jeat_graph.io.tables.sensor_columns import Said
+from jeat_graph.io.tables.sensor_columns import Declared
 
 _SUFFIX = ".tracking.yaml"
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
@@ -34,7 +34,7 @@ class _Declared:
     sensor: SensorConfig = field(default_factory=SensorConfig)
 
 
-def known_of(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> Said:
+def known_of(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> Declared:
     """Return what is known of the networks that detect, as settings of the tracker by sensor and key.
 
     Detectors without weights say nothing.
@@ -46,13 +46,13 @@ def known_of(request: DetectRequest, say: Callable[[str], object] = lambda _: No
     Raises:
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
     """
-    looking = {
+    given = {
         FRAMES_SENSOR: request.detector_frames if request.frames is not None else None,
         EVENTS_SENSOR: request.detector_events if request.events is not None else None,
     }
     if request.detector_fused is not None:
-        looking = {FUSED_SENSOR: request.detector_fused}
-    networks = {sensor: by for sensor, by in looking.items() if by is not None}
+        given = {FUSED_SENSOR: request.detector_fused}
+    networks = {sensor: by for sensor, by in given.items() if by is not None}
     return known_of_networks(networks, say, request.settings.model_frames)
 
 
@@ -75,7 +75,7 @@ def known_of_networks(
     detectors: Mapping[str, str],
     say: Callable[[str], object] = lambda _: None,
     reading: ModelSettings | None = None,
-) -> Said:
+) -> Declared:
     """Return the same of detectors whose boxes come from elsewhere, from a file or a pipe.
 
     Args:
@@ -86,7 +86,7 @@ def known_of_networks(
     Raises:
         ConfigError: a detector that is not known, or a file that cannot be read or holds something else.
     """
-    found: Said = {}
+    found: Declared = {}
     for sensor, detector in detectors.items():
         if detector == MOTION:
             continue

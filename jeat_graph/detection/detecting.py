@@ -295,9 +295,9 @@ def _events(
         reader.t_offset_us = 0
         return reader, (width, height)
     clock = None if source is None else FrameClock(float(source.times_s[0]), source.origin_s)
-    reader.t_offset_us, said = events_later_us(reader.t_offset_us, reader.origin_us, clock)
-    if said:
-        say(f"events: {said}")
+    reader.t_offset_us, shift_note = events_later_us(reader.t_offset_us, reader.origin_us, clock)
+    if shift_note:
+        say(f"events: {shift_note}")
     return reader, (width, height)
 
 

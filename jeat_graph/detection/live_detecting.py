@@ -209,7 +209,7 @@ def detect_live(
     begun = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(origin_s))
     say(f"time 0 is {begun}.{int(origin_s % 1.0 * 1000):03d}Z; Ctrl-C ends the recording")
     with LiveDetecting(request, say, lambda: wall() - origin_s) as live:
-        first = _FirstLook(request.duration_s, live, until)
+        first = _FirstPictures(request.duration_s, live, until)
         request = live.prepare(first.is_over)
         first.check()
         if live.size_px is None:
@@ -222,7 +222,7 @@ def detect_live(
             say(line)
 
 
-class _FirstLook:
+class _FirstPictures:
     """How long cameras may take until each has given something, if only so long is looked at them."""
 
     def __init__(self, duration_s: float | None, live: LiveDetecting, until: Until) -> None:

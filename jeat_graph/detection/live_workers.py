@@ -9,7 +9,7 @@ from typing import Generic
 import numpy as np
 
 from jeat_graph.data.detections import Scan
-from jeat_graph.detection.automatic import LOOK_S, PICTURES, chosen_by
+from jeat_graph.detection.automatic import PICTURES, SAMPLE_S, chosen_by
 from jeat_graph.detection.binned import BinnedDetector
 from jeat_graph.detection.burnt_in import find_clock
 from jeat_graph.detection.camera_flow import CameraFlow
@@ -90,10 +90,10 @@ class PictureWorker(Worker[LivePicture]):
         for picture in self.items(stopped):
             if not self._fits(picture):
                 continue
-            if not times or picture.t - times[-1] >= LOOK_S / PICTURES:
+            if not times or picture.t - times[-1] >= SAMPLE_S / PICTURES:
                 frames.append(picture.frame)
                 times.append(picture.t)
-            if self.detector != AUTO or times[-1] - times[0] >= LOOK_S:
+            if self.detector != AUTO or times[-1] - times[0] >= SAMPLE_S:
                 break
         if self.detector == AUTO and frames:
             self.detector = chosen_by(

@@ -77,9 +77,9 @@ class MaskedPicture:
         if keep.all():
             return scan
         classes = None if scan.classes is None else scan.classes[keep]
-        looks = None if scan.embeddings is None else scan.embeddings[keep]
+        vectors = None if scan.embeddings is None else scan.embeddings[keep]
         return replace(
-            scan, boxes=scan.boxes[keep], scores=scan.scores[keep], classes=classes, embeddings=looks
+            scan, boxes=scan.boxes[keep], scores=scan.scores[keep], classes=classes, embeddings=vectors
         )
 
     def keep(self, boxes: FloatArray) -> BoolArray:

@@ -40,9 +40,9 @@ _THIS_MACHINE = ("127.0.0.1", "localhost", "::1")
 
 def cache_folder() -> Path:
     """Return the folder of the files; it need not be there."""
-    said = os.environ.get(FOLDER)
-    if said:
-        return Path(said)
+    given = os.environ.get(FOLDER)
+    if given:
+        return Path(given)
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "jeat-graph" / "networks"
 
@@ -97,8 +97,8 @@ def _folder_of(mirror: str) -> str:
     """
     try:
         parts = urllib.parse.urlsplit(mirror)
-        told = parts.hostname, parts.port  # a port that is none raises
-        good = parts.scheme in ("https", "http") and bool(told[0]) and not (parts.query or parts.fragment)
+        place = parts.hostname, parts.port  # a port that is none raises
+        good = parts.scheme in ("https", "http") and bool(place[0]) and not (parts.query or parts.fragment)
     except ValueError:
         good = False
     if not good or not mirror.isprintable() or " " in mirror:

@@ -100,7 +100,7 @@ class NoiseFilter:
         start = 0
         while start < len(events):
             if events.t_us[start] >= self._period_end:
-                self._look_for_hot(settings.period_s if self._period_end > _LONG_AGO else 0.0)
+                self._find_hot(settings.period_s if self._period_end > _LONG_AGO else 0.0)
                 self._period_end = int(events.t_us[start]) + period_us
             self._follow(int(events.t_us[start]))
             last_us = min(self._period_end, self._begin_us + 2 * _MOST_LATER_US)
@@ -125,7 +125,7 @@ class NoiseFilter:
             self._last = np.maximum(moved, _NEVER).astype(np.int32)
             self._begin_us = now_us
 
-    def _look_for_hot(self, period_s: float) -> None:
+    def _find_hot(self, period_s: float) -> None:
         if self.settings.hot_pixels and period_s > 0.0:
             padded = np.pad(self._counts, 1)
             around = sum(

@@ -81,8 +81,8 @@ class DetectRequest:
         """What looks, `sensor: name`, of networks by file the file's name."""
         if self.detector_fused is not None:
             return (f"fused: {Path(self.detector_fused).name}",)
-        looking = (("rgb", self.frames, self.detector_frames), ("evt", self.events, self.detector_events))
-        return tuple(f"{sensor}: {Path(name).name}" for sensor, file, name in looking if file is not None)
+        given = (("rgb", self.frames, self.detector_frames), ("evt", self.events, self.detector_events))
+        return tuple(f"{sensor}: {Path(name).name}" for sensor, file, name in given if file is not None)
 
     @property
     def files(self) -> list[str]:

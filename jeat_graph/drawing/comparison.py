@@ -91,7 +91,7 @@ def write_plots(
 
 def _trajectories(plt: Any, samples: Samples) -> Figure:
     """Position error and velocity of well-observed tracks that go far, with 2σ bands."""
-    chosen = telling_tracks(samples)
+    chosen = informative_tracks(samples)
     parts = ((0, "error of x", "px"), (1, "velocity in x", "px/s"))[: 1 + samples.has_motion]
     figure, axes = plt.subplots(
         len(chosen), len(parts), figsize=(11.0, 2.7 * len(chosen) + 0.8), squeeze=False, layout="constrained"
@@ -122,7 +122,7 @@ def _trajectories(plt: Any, samples: Samples) -> Figure:
     return figure  # type: ignore[no-any-return]
 
 
-def telling_tracks(samples: Samples) -> IntArray:
+def informative_tracks(samples: Samples) -> IntArray:
     """Choose the tracks that are drawn: of the better-observed half those that go furthest in the picture.
 
     The longest tracks of all are parked cars, which show nothing of motion.

@@ -58,10 +58,10 @@ def write_coco_tracks(
 
 
 def _write(request: ExportRequest) -> str:
-    frames, rate_hz, said = tables_at_frames(request)
+    frames, rate_hz, summary = tables_at_frames(request)
     width, height = picture_of(request)
     write_coco_tracks(frames, request.out, rate_hz, (round(width), round(height)))
-    return said
+    return summary
 
 
 EXPORT = ExportTarget(

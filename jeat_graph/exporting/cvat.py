@@ -52,9 +52,9 @@ def write_cvat(table: Trajectories, path: str | Path, rate_hz: float, label: str
 
 
 def _write(request: ExportRequest) -> str:
-    frames, rate_hz, said = tables_at_frames(request)
+    frames, rate_hz, summary = tables_at_frames(request)
     write_cvat(frames, request.out, rate_hz)
-    return said
+    return summary
 
 
 EXPORT = ExportTarget(

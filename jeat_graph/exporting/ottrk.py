@@ -143,11 +143,11 @@ def _metadata(video: OttrkVideo, frames: int, classes: Sequence[str]) -> dict[st
 
 
 def _write(request: ExportRequest) -> str:
-    frames, rate_hz, said = tables_at_frames(request)
+    frames, rate_hz, summary = tables_at_frames(request)
     width, height = picture_of(request)
     name = request.video or f"{Path(request.source).resolve().name}.mp4"
     write_ottrk(frames, request.out, OttrkVideo(name, int(width), int(height), rate_hz, request.start or 0.0))
-    return said
+    return summary
 
 
 EXPORT = ExportTarget(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from jeat_graph.exporting.record import ExportRequest, ExportTarget
-from jeat_graph.exporting.sources import run_tables, said_of
+from jeat_graph.exporting.sources import run_tables, summary_of
 
 
 def _write(request: ExportRequest) -> str:
@@ -13,7 +13,7 @@ def _write(request: ExportRequest) -> str:
 
     tables = run_tables(request, every=True)
     log_run(tables, Path(request.source).resolve().name, request.out)
-    return said_of(tables)
+    return summary_of(tables)
 
 
 EXPORT = ExportTarget(

@@ -40,7 +40,7 @@ def run_tables(request: ExportRequest, *, every: bool = False) -> dict[str, Traj
     return {kind: read_trajectories(files[kind], **request.reading) for kind in kinds}
 
 
-def said_of(tables: dict[str, Trajectories]) -> str:
+def summary_of(tables: dict[str, Trajectories]) -> str:
     """Say which tables were written."""
     return f" ({', '.join(tables)} tracks)"
 
@@ -65,7 +65,7 @@ def tables_at_frames(request: ExportRequest) -> tuple[Trajectories, float, str]:
     return (
         at_frames(table, "smoothed" if kind == "smoothed" else "causal", at, rate_hz),
         rate_hz,
-        said_of(tables),
+        summary_of(tables),
     )
 
 

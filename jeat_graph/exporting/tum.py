@@ -13,7 +13,7 @@ import numpy as np
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.exporting.record import ExportRequest, ExportTarget
-from jeat_graph.exporting.sources import run_tables, said_of
+from jeat_graph.exporting.sources import run_tables, summary_of
 from jeat_graph.io.files.atomic import open_atomic
 
 
@@ -49,7 +49,7 @@ def _write(request: ExportRequest) -> str:
     if request.track is None:
         raise DataError("--to tum writes one trajectory: say which with --track ID")
     write_tum(next(iter(tables.values())), request.track, request.out)
-    return said_of(tables)
+    return summary_of(tables)
 
 
 EXPORT = ExportTarget(

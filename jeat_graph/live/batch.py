@@ -206,9 +206,9 @@ def _with_truth(
 
 def _of_truth(recording: ManifestRow) -> ReadingOptions:
     """How the truth is read: with the unit of times, the video and the names of classes of the detections."""
-    said = recording.reading
-    how: ReadingOptions = {"video": said.get("video"), "class_names": said.get("class_names")}
-    return {**how, "time_unit": said["time_unit"]} if "time_unit" in said else how
+    read_how = recording.reading
+    how: ReadingOptions = {"video": read_how.get("video"), "class_names": read_how.get("class_names")}
+    return {**how, "time_unit": read_how["time_unit"]} if "time_unit" in read_how else how
 
 
 def _judge(runs: dict[str, JudgedRun]) -> tuple[dict[str, Judgement], dict[str, dict[str, float]]]:

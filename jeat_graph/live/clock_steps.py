@@ -181,7 +181,7 @@ class ClockSteps:
                     self._goes_on(scan)
                 take.append(scan)
                 continue
-            self._look_beside(doubt)
+            self._compare_beside(doubt)
             if doubt.jump > 0.0:
                 doubt.held.append(scan)
                 held.append(scan)
@@ -317,7 +317,7 @@ class ClockSteps:
             doubt.newest - doubt.beside[other][0] >= _BESIDE_S for other in others if other in doubt.beside
         )
 
-    def _look_beside(self, doubt: _Doubt) -> None:
+    def _compare_beside(self, doubt: _Doubt) -> None:
         """Note since when each of the others has gone on as this sensor does."""
         for name, one in self._rhythms.items():
             if name in doubt.marks and one.known:

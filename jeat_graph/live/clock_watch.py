@@ -24,7 +24,7 @@ from jeat_graph.runs.clock_comparison import (
     ClockComparison,
     FoundClock,
     compare_in_steps,
-    said_of,
+    summary_of,
     taken_off_each,
     unsure_of,
 )
@@ -34,7 +34,7 @@ WINDOW_S, _APART_S = 60.0, 0.03
 #: Sensors are compared when two of them have been heard for so long (s); later at doubled times, up to this.
 _FIRST_S, _EARLY, _MOST_BETWEEN_S = 15.0, 4, 3600.0
 # So much is tracked for the exact offset (s): it bounds the work.
-_LOOKED_AT_S = 25.0
+_COMPARED_S = 25.0
 # Steps of the work for each second that a sensor goes on, and at most with one message.
 _STEPS_A_SECOND, _MOST_STEPS = 250.0, 25
 #: Clocks that are known are compared again after so long (s), and then so often at most.
@@ -101,14 +101,14 @@ class ClockWatch:
     def __init__(self, config: Config) -> None:
         self._jump_s = config.live.jump_s
         self._rig = any(sensor.clock is not None for sensor in config.sensors.values())
-        self._looks = config.input.clocks == "find"
+        self._compares = config.input.clocks == "find"
         self._given = {name for name, sensor in config.sensors.items() if sensor.latency_s != 0.0}
         self.clocks: dict[str, dict[str, float]] = {}
         self._met: list[str] = []  # in order of their first scans
         self._settled: list[str] = []
         self._again = False  # whether what is known is being compared again
         self._settled_at: float | None = None  # newest time when all were known (s)
-        self._told: list[str] = []
+        self._warned: list[str] = []
         self._heard: dict[str, _Heard] = {}
         self._compared = 0  # comparisons since somebody new was met, or a clock jumped
         self._last: dict[str, list[float]] = {}  # by pair, lag and its std by the last comparison
@@ -127,7 +127,7 @@ class ClockWatch:
         Args:
             scans: which have not come before; what was found (`lag_s`) is taken off their times.
         """
-        if not self._looks:
+        if not self._compares:
             return None
         watched = [scan for scan in scans if scan.sensor not in self._given]
         self._meet(watched)
@@ -263,7 +263,7 @@ class ClockWatch:
             before = self.clocks.get(name, {"lag_s": 0.0})["lag_s"]
             lag_s = round(before + found.lag_s, 6)
             self.clocks[name] = {"lag_s": lag_s, "std_s": round(found.std_s, 6), "at_s": newest[name]}
-            lines.append(said_of(name, lag_s, found.std_s))
+            lines.append(summary_of(name, lag_s, found.std_s))
         fresh = [name for name in (reference, *agree, *sure) if name not in self._settled]
         if agree or sure:
             self._settled += fresh
@@ -274,9 +274,9 @@ class ClockWatch:
 
     def _once(self, key: str, line: str) -> list[str]:
         """Return a line that was not told yet; what a minute shows is not told before."""
-        if key in self._told or self._compared < _EARLY:
+        if key in self._warned or self._compared < _EARLY:
             return []
-        self._told.append(key)
+        self._warned.append(key)
         return [line]
 
     def state(self) -> dict[str, Any]:
@@ -287,7 +287,7 @@ class ClockWatch:
             "settled": self._settled,
             "again": self._again,
             "settled_at": self._settled_at,
-            "told": self._told,
+            "warned": self._warned,
             "heard": {name: one.state() for name, one in self._heard.items()},
             "compared": self._compared,
             "last": self._last,
@@ -300,7 +300,7 @@ class ClockWatch:
         self.clocks = {name: dict(one) for name, one in state["clocks"].items()}
         self._met, self._settled = list(state["met"]), list(state["settled"])
         self._again, self._settled_at = state["again"], state["settled_at"]
-        self._told, self._compared = list(state["told"]), state["compared"]
+        self._warned, self._compared = list(state["warned"]), state["compared"]
         self._heard = {
             name: _Heard(one["begun"], deque(one["scans"]), one["odd"])
             for name, one in state["heard"].items()
@@ -346,6 +346,6 @@ def _compare_all(
         if name != reference and name not in settled:
             pair = (reference, name)
             compared[name] = yield from compare_in_steps(
-                recordings[reference], recording, pair, _LOOKED_AT_S, exactly=again
+                recordings[reference], recording, pair, _COMPARED_S, exactly=again
             )
     return reference, compared

@@ -111,8 +111,8 @@ class SensorHealth:
 
     def _patience_s(self, sensor: str) -> float:
         """Return after how long without a scan a sensor counts as silent (s)."""
-        live, said = self._config.live, self._config.sensors.get(sensor, SensorConfig())
-        return max(live.silent_s, live.silent_periods / said.rate_hz)
+        live, declared = self._config.live, self._config.sensors.get(sensor, SensorConfig())
+        return max(live.silent_s, live.silent_periods / declared.rate_hz)
 
     def jumped(self, now: float) -> None:
         """Note that time goes on elsewhere: no sensor has been silent meanwhile.

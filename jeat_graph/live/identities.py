@@ -40,7 +40,7 @@ class Identities:
         self._shown = np.zeros(len(living), dtype=np.bool_)  # which of them have been in an answer
         # Others that have been, of tracks that are no more.
         self._lost: IntArray = np.zeros(0, dtype=np.int64)
-        self._alike = True  # whether own numbers and those given out are the same, of all from now on
+        self._unchanged = True  # whether own numbers and those given out are the same, of all from now on
 
     @property
     def next_given(self) -> int:
@@ -49,7 +49,7 @@ class Identities:
 
     def of(self, own: IntArray) -> IntArray:
         """Return what was given out (N,) for tracks by their own numbers (N,), all of which are known."""
-        return own if self._alike else self._given[np.searchsorted(self._own, own)]
+        return own if self._unchanged else self._given[np.searchsorted(self._own, own)]
 
     def answer(self, table: Table) -> Table:
         """Return what `rename` does, for a table that is given out as the answer to a scan."""
@@ -58,7 +58,7 @@ class Identities:
 
     def rename(self, table: Table) -> Table:
         """Return a table of one moment with the identities given out, its rows by these."""
-        if self._alike or not len(table):
+        if self._unchanged or not len(table):
             return table
         table = replace(table, track_id=self.of(table.track_id))
         if (np.diff(table.track_id) > 0).all():
@@ -134,7 +134,7 @@ class Identities:
         self._next_given += len(fresh)
         self._next_own = next_own
         self._lost = answered[~np.isin(answered, given)][:_MOST_LOST]
-        self._alike = self._alike and next_own == self._next_given and bool((own == given).all())
+        self._unchanged = self._unchanged and next_own == self._next_given and bool((own == given).all())
         self._own, self._given, self._shown = own, given, shown
 
     def forget(self, living: IntArray, first: int) -> None:
@@ -157,7 +157,7 @@ class Identities:
             "lost": self._lost,
             "next_own": self._next_own,
             "next_given": self._next_given,
-            "alike": self._alike,
+            "unchanged": self._unchanged,
         }
 
     @staticmethod
@@ -165,7 +165,7 @@ class Identities:
         """Make identities of what `state` returned."""
         made = Identities(state["own"], state["next_own"])
         made._given, made._next_given = state["given"], state["next_given"]
-        made._shown, made._lost, made._alike = state["shown"].copy(), state["lost"], state["alike"]
+        made._shown, made._lost, made._unchanged = state["shown"].copy(), state["lost"], state["unchanged"]
         return made
 
 

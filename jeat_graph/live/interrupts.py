@@ -110,15 +110,15 @@ class _Lines:
 
     def readline(self, most: int) -> bytes:
         """Read to the end of the line, or `most` bytes of it; nothing at the end, or after an interrupt."""
-        looked = 0
+        searched = 0
         while True:
-            end = self._held.find(b"\n", looked) + 1
-            looked = len(self._held)
-            if end or looked >= most:
+            end = self._held.find(b"\n", searched) + 1
+            searched = len(self._held)
+            if end or searched >= most:
                 return self._take(min(end or most, most))
             if self._ended:
                 # A writer that the same signal ends leaves a line half written.
-                return b"" if self._interrupts.seen is not None else self._take(looked)
+                return b"" if self._interrupts.seen is not None else self._take(searched)
             part = self._more()
             if part is None:
                 return b""

@@ -391,9 +391,9 @@ class LiveTracker(OneAtATime):
     def _know(self, sensor: str) -> None:
         """Go by what the configuration says of a sensor, or by what it says of those that nobody declared."""
         config = self.tracker.config
-        said = config.sensors.get(sensor, SensorConfig())
-        self._latency[sensor] = said.latency_s
-        self._late_s[sensor] = config.live.late_s if said.late_s is None else said.late_s
+        declared = config.sensors.get(sensor, SensorConfig())
+        self._latency[sensor] = declared.latency_s
+        self._late_s[sensor] = config.live.late_s if declared.late_s is None else declared.late_s
         if self.policy == REWIND:
             self._keep_s = max(self._keep_s, self._late_s[sensor] + 2.0 * _ROUNDING_S)
 

@@ -101,13 +101,13 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
     recordings: list[ManifestRow] = []
     taken: set[str] = set()
     for row in range(len(table)):
-        said = {name: values[row] for name, values in text.items()}
+        cells = {name: values[row] for name, values in text.items()}
         error = partial(table.error, row)
-        files = tuple(_located(item, folder) for item in _parts(said.get("detections", "")))
-        first = [said[key] for key in _INPUTS if said.get(key)]
+        files = tuple(_located(item, folder) for item in _parts(cells.get("detections", "")))
+        first = [cells[key] for key in _INPUTS if cells.get(key)]
         if not first:
             raise table.error(row, f"{', '.join(key for key in _INPUTS if key in table)} is missing")
-        name = said.get("name") or _stem(files[0] if files else first[0])
+        name = cells.get("name") or _stem(files[0] if files else first[0])
         if not _NAME.fullmatch(name):
             raise table.error(row, f"name {name!r} must be letters, digits, dots, dashes or underlines")
         if name in taken:
@@ -120,12 +120,12 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
             ManifestRow(
                 name=name,
                 detections=files,
-                config=_config(said.get("config", ""), folder),
-                overrides=(*_parts(said.get("set", "")), *_picture(said.get("image", ""), error)),
-                truth=_located(said["gt"], folder) if said.get("gt") else None,
+                config=_config(cells.get("config", ""), folder),
+                overrides=(*_parts(cells.get("set", "")), *_picture(cells.get("image", ""), error)),
+                truth=_located(cells["gt"], folder) if cells.get("gt") else None,
                 rate_hz=hz,
-                camera=_located(said["camera"], folder) if said.get("camera") else None,
-                **({"reading": _reading(said, folder, error)} if files else _raw(said, folder, error)),
+                camera=_located(cells["camera"], folder) if cells.get("camera") else None,
+                **({"reading": _reading(cells, folder, error)} if files else _raw(cells, folder, error)),
             )
         )
     if not recordings:
@@ -133,16 +133,16 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
     return recordings
 
 
-def _raw(said: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
+def _raw(cells: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
     """Fields of a row without detections: where they come from, and by what."""
-    strange = next((key for key in READING_COLUMNS if said.get(key) and key not in _READ_RAW), None)
+    strange = next((key for key in READING_COLUMNS if cells.get(key) and key not in _READ_RAW), None)
     if strange is not None:
         raise error(f"{strange} is for recordings with detections")
     return {
-        **{key: _located(said[key], folder) for key in _INPUTS[1:] if said.get(key)},
-        **{key: _network(said.get(key, ""), folder) for key in ("detector_frames", "detector_events")},
-        "classes": tuple(_parts(said.get("class", ""))),
-        "masks": tuple(_config(one, folder) or one for one in _parts(said.get("mask", ""))),
+        **{key: _located(cells[key], folder) for key in _INPUTS[1:] if cells.get(key)},
+        **{key: _network(cells.get(key, ""), folder) for key in ("detector_frames", "detector_events")},
+        "classes": tuple(_parts(cells.get("class", ""))),
+        "masks": tuple(_config(one, folder) or one for one in _parts(cells.get("mask", ""))),
     }
 
 
@@ -151,9 +151,9 @@ def _network(text: str, folder: Path) -> str | None:
     return (str(folder / text) if text.endswith(".onnx") else text) or None
 
 
-def _reading(said: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
+def _reading(cells: Mapping[str, str], folder: Path, error: Callable[[str], DataError]) -> dict[str, Any]:
     """Fields of a `TrackRequest` that a row says, by the columns `READING_COLUMNS`."""
-    strange = next((key for key in RAW_COLUMNS if said.get(key)), None)
+    strange = next((key for key in RAW_COLUMNS if cells.get(key)), None)
     if strange is not None:
         raise error(f"{strange} is for recordings without detections")
     found: dict[str, Any] = {}
@@ -164,17 +164,17 @@ def _reading(said: Mapping[str, str], folder: Path, error: Callable[[str], DataE
         "input_format": format_names(),
     }
     for name, values in allowed.items():
-        text = said.get(name)
+        text = cells.get(name)
         if text and text not in values:
             raise error(f"{name} must be {', '.join(values)}, got {text!r}")
         if text:
             found[name] = int(text) if name == "first_frame" else text
-    if said.get("only_video"):
-        found["video"] = said["only_video"]
-    if said.get("class"):
-        found["classes"] = tuple(_parts(said["class"]))
+    if cells.get("only_video"):
+        found["video"] = cells["only_video"]
+    if cells.get("class"):
+        found["classes"] = tuple(_parts(cells["class"]))
     for name, key in (("classes", "class_names"), ("images", "images"), ("frames", "frames")):
-        text = said.get(name, "")
+        text = cells.get(name, "")
         if text:
             listed = name == "classes" and "," in text and not (folder / text).exists()
             # Absolute: a worker of a cluster stands in another folder.

@@ -20,7 +20,7 @@ from jeat_graph.live.counts import Counts, count_lines
 from jeat_graph.live.health import CLOCK, HealthChange, SensorHealth
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import Duplicates, ScanMessage
-from jeat_graph.live.told import Told
+from jeat_graph.live.session_warnings import SessionWarnings
 from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.version import __version__
@@ -126,7 +126,7 @@ class Session:
             self._health.silent, self._health.rubbish = kept.get("silent", []), kept.get("rubbish", [])
             self._health.usual = kept.get("usual", {})
         self._pace = CommitPace()
-        self._told = Told(ends.warn, live.tracker.config.live.jump_s)
+        self._warnings = SessionWarnings(ends.warn, live.tracker.config.live.jump_s)
         self._owed = False  # the tracker has taken a scan whose answer has not gone out
         self._unconfirmed = ""  # or why the last answers may not have arrived
         self._interval = None if live.time is None else live.time // every_s
@@ -147,7 +147,7 @@ class Session:
             self._passed_again(message, place)
             return None
         if self._seen.restarts.get(message.source, 0) > restarts:
-            self._told.restart(message, place)
+            self._warnings.restart(message, place)
         before = self.live.time
         config = self.live.tracker.config
         arrival = self.live.step(message.batch.scans)
@@ -161,7 +161,7 @@ class Session:
             return None
         self.count += 1
         self.flat += message.batch.flat
-        self._told.arrived(arrival, message.source, before, place)
+        self._warnings.arrived(arrival, message.source, before, place)
         if arrival.reset or arrival.leapt:
             self._health.jumped(arrival.t)
         if self.ends.smoothed is not None:
@@ -186,7 +186,7 @@ class Session:
     def _passed_again(self, message: ScanMessage, place: str) -> None:
         """Count a message that had been taken before."""
         self.duplicates += 1
-        self._told.again(message, place)
+        self._warnings.again(message, place)
 
     @property
     def too_large(self) -> int:

@@ -25,7 +25,7 @@ class UntakenRun:
     Attributes:
         count: how many.
         lasted_s: how long they have gone on by their own times (s).
-        told: whether it has been told of.
+        reported: whether it has been told of.
     """
 
     def __init__(self, first_s: float, most_s: float = _MOST_S) -> None:
@@ -34,7 +34,7 @@ class UntakenRun:
 
     def taken(self) -> None:
         """Note that one was taken."""
-        self.count, self.lasted_s, self.told = 0, 0.0, False
+        self.count, self.lasted_s, self.reported = 0, 0.0, False
         self._at_count, self._at_s = _COUNT, self._first_s
         self._t: float | None = None
 
@@ -48,7 +48,7 @@ class UntakenRun:
             return False
         self._at_count = self.count + min(self.count, _MOST_COUNT)
         self._at_s = self.lasted_s + min(max(self.lasted_s, self._first_s), self._most_s)
-        self.told = True
+        self.reported = True
         return True
 
 
@@ -70,7 +70,7 @@ class Untaken:
     def taken(self, names: Iterable[str]) -> list[tuple[str, UntakenRun]]:
         """Note whose were taken; returns the runs that had been told of and end now."""
         ended = [(name, self._runs.pop(name)) for name in set(names) if name in self._runs]
-        return sorted((name, run) for name, run in ended if run.told)
+        return sorted((name, run) for name, run in ended if run.reported)
 
     def untaken(self, name: str, t: float) -> UntakenRun | None:
         """Note that one was not taken (its time in s); returns its run if it is to be told of now."""

@@ -47,7 +47,7 @@ class Agreement(NamedTuple):
     usual: float
 
 
-class _Looks(NamedTuple):
+class _SampledBoxes(NamedTuple):
     """Scans (S,) of one sensor, their boxes (S, P, 4) padded with NaN: x, y, ln size, size."""
 
     t: FloatArray
@@ -69,12 +69,12 @@ def agreement_in_steps(
     """
     if min(len(first), len(second)) < _LEAST_BOXES:
         return None
-    ours = yield from _looks(first, None)
+    ours = yield from _samples(first, None)
     scans = _SCANS
     if pairs is not None:
         wide = ours.boxes.shape[1] * min(int(np.diff(second.scan_start).max()), _MOST_BOXES)
         scans = min(scans, max(pairs // wide, _LEAST_SCANS))
-    theirs = yield from _looks(second, scans)
+    theirs = yield from _samples(second, scans)
     tried = _differences(ours.t, theirs.t)
     if not len(tried):
         return None
@@ -109,7 +109,7 @@ def _differences(ours: FloatArray, theirs: FloatArray) -> FloatArray:
     return np.asarray(tried[(tried >= low) & (tried <= high)])
 
 
-def _looks(detections: Detections, most: int | None) -> Generator[None, None, _Looks]:
+def _samples(detections: Detections, most: int | None) -> Generator[None, None, _SampledBoxes]:
     filled = np.flatnonzero(np.diff(detections.scan_start) > 0)
     if most is not None and len(filled) > most:
         filled = filled[np.linspace(0, len(filled) - 1, most).round().astype(int)]
@@ -126,22 +126,22 @@ def _looks(detections: Detections, most: int | None) -> Generator[None, None, _L
         out[k, : len(rows)] = np.column_stack([own[:, :2] + 0.5 * own[:, 2:], np.log(size), size])
         if k % _SCANS_A_STEP == 0:
             yield
-    return _Looks(detections.scan_t[filled], out)
+    return _SampledBoxes(detections.scan_t[filled], out)
 
 
-def _score(ours: _Looks, theirs: _Looks, offset: float) -> float:
+def _score(ours: _SampledBoxes, theirs: _SampledBoxes, offset: float) -> float:
     """Mean agreement of the second's boxes at a difference of the clocks, where the first looks too."""
     wanted = theirs.t - offset
     after = np.clip(np.searchsorted(ours.t, wanted), 1, len(ours.t) - 1)
     nearest = np.where(wanted - ours.t[after - 1] < ours.t[after] - wanted, after - 1, after)
-    looked = np.abs(ours.t[nearest] - wanted) < _NEAR_S
-    if not looked.any():
+    sampled = np.abs(ours.t[nearest] - wanted) < _NEAR_S
+    if not sampled.any():
         return 0.0
-    a, b = ours.boxes[nearest[looked]][:, None, :, :], theirs.boxes[looked][:, :, None, :]
+    a, b = ours.boxes[nearest[sampled]][:, None, :, :], theirs.boxes[sampled][:, :, None, :]
     apart = np.hypot(a[..., 0] - b[..., 0], a[..., 1] - b[..., 1]) / (
         _REACH * np.minimum(a[..., 3], b[..., 3])
     )
-    alike = np.abs(a[..., 2] - b[..., 2]) < np.log(_SAME_SIZE)
-    match = np.where(alike & (apart < 1.0), 1.0 - apart, 0.0).max(axis=2)
-    there = np.isfinite(theirs.boxes[looked][:, :, 0])
+    same_size = np.abs(a[..., 2] - b[..., 2]) < np.log(_SAME_SIZE)
+    match = np.where(same_size & (apart < 1.0), 1.0 - apart, 0.0).max(axis=2)
+    there = np.isfinite(theirs.boxes[sampled][:, :, 0])
     return float(match[there].mean()) if there.any() else 0.0

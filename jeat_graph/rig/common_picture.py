@@ -152,7 +152,7 @@ def in_common(detections: Detections, config: Config) -> tuple[Detections, Confi
     if not common.ways:
         return detections, config, []
     moved = common.detections(detections)
-    notes = [_said(name, way) for name, way in common.ways.items() if name in detections.sensors]
+    notes = [_note(name, way) for name, way in common.ways.items() if name in detections.sensors]
     if common.lost:
         notes.append(
             f"{common.lost} boxes lie where the common picture's camera cannot see, and are left out"
@@ -263,7 +263,7 @@ def _way(name: str, sensor: SensorConfig, config: Config) -> Way:
     return Way(PictureMap.scale(own, common), own, sensor.clock)
 
 
-def _said(name: str, way: Way) -> str:
+def _note(name: str, way: Way) -> str:
     parts = []
     if way.picture is not None and way.own is not None:
         kind = "a matrix with parallax" if way.picture.parallax else "a homography"

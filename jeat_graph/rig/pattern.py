@@ -131,14 +131,14 @@ def find_corners(picture: Picture, pattern: Pattern) -> Corners | None:
     import cv2
 
     grey = picture if picture.ndim == 2 else cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
-    for scale, one in _looks(np.ascontiguousarray(grey, dtype=np.uint8)):
+    for scale, one in _scaled(np.ascontiguousarray(grey, dtype=np.uint8)):
         found = _charuco(one, pattern) if pattern.kind == CHARUCO else _grid(one, pattern)
         if found is not None:
             return Corners(found.number, (found.xy + _HALF_PX) / scale)
     return None
 
 
-def _looks(grey: Picture) -> Iterator[tuple[int, Picture]]:
+def _scaled(grey: Picture) -> Iterator[tuple[int, Picture]]:
     """The picture (H, W) with its scale: as it is, larger and smooth for small patterns, and inverted."""
     import cv2
 

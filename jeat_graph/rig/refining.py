@@ -132,8 +132,8 @@ def refine(
     centre, scale = _prior(unknowns, *sizes)
     for _ in range(_ROUNDS):
         rows, residuals = zip(*(_rows(path, unknowns, sigma, scale) for path in paths), strict=True)
-        gone = (_numbers(unknowns) - centre) / scale
-        solved = solve_paths(rows, np.eye(len(scale)), -gone)
+        shift = (_numbers(unknowns) - centre) / scale
+        solved = solve_paths(rows, np.eye(len(scale)), -shift)
         unknowns = unknowns.moved(scale * solved.shared)
         paths = [
             path._replace(states=_unscaled(states)) for path, states in zip(paths, solved.states, strict=True)
@@ -141,7 +141,7 @@ def refine(
         sigma = (_robust([part for one in residuals for part in one]),) * 2
         if _largest_move(unknowns.way, scale * solved.shared, paths) < _ENOUGH_PX:
             break
-    return _told(unknowns, solved, scale, paths, sigma)
+    return _result(unknowns, solved, scale, paths, sigma)
 
 
 def no_smaller(value: float) -> float:
@@ -351,7 +351,7 @@ def _largest_move(way: PictureMap, step: FloatArray, paths: list[_Path]) -> floa
     return float(np.nanmax(np.abs(moved)))
 
 
-def _told(
+def _result(
     unknowns: _Unknowns,
     solved: SharedPaths,
     scale: FloatArray,

@@ -89,7 +89,7 @@ def register_by_traffic(
             )
             _check_matches(matched, names)
     except RuntimeError:
-        raise _untold(names, "it leaves the map between the pictures open") from None
+        raise _undetermined(names, "it leaves the map between the pictures open") from None
     _check_certainty(refined, second, matched, names, sizes[1])
     return Registration(refined.way, refined.clock, _lines(refined, matched, names, sizes[1]))
 
@@ -189,7 +189,9 @@ def _best(first: SensorTracks, second: SensorTracks, names: tuple[str, str]) -> 
         if (one := match_at(first, second, candidate.shift)) is not None
     ]
     if not found:
-        raise _untold(names, "no vehicle of the one fits one of the other, at any difference of their clocks")
+        raise _undetermined(
+            names, "no vehicle of the one fits one of the other, at any difference of their clocks"
+        )
     found.sort(key=lambda one: -len(one.a))
     best = found[0]
     others = [len(one.a) for one in found[1:] if abs(one.offset_s - best.offset_s) > _OTHER_S]
@@ -199,13 +201,13 @@ def _best(first: SensorTracks, second: SensorTracks, names: tuple[str, str]) -> 
 def _check_matches(matched: MatchedTracks, names: tuple[str, str]) -> None:
     count, possible = len(matched.a), matched.possible
     if count < LEAST_VEHICLES or count < _LEAST_SHARE * possible:
-        raise _untold(
+        raise _undetermined(
             names,
             f"at best {count} of {possible} vehicles have a partner: they look at different roads, or did "
             "not record at one time",
         )
     if matched.wrong_map > _MOST_SECOND * count:
-        raise _untold(
+        raise _undetermined(
             names,
             f"{count} vehicles have a partner at {matched.offset_s:.2f} s between the clocks, and "
             f"{matched.wrong_map} at quite another difference: record longer",
@@ -220,20 +222,20 @@ def _check_certainty(
     own: tuple[float, float],
 ) -> None:
     if _in_one_lane(second, matched):
-        raise _untold(
+        raise _undetermined(
             names,
             "all vehicles that both see drive in one lane, which tells nothing of what is beside it: "
             "record where they drive in several, or give --points",
         )
     std = refined.way.std_px(own)
     if std > _MOST_SIZES * refined.sizes_px:
-        raise _untold(
+        raise _undetermined(
             names,
             f"it tells the map to ± {std:.0f} px only: record longer, or give corresponding points with "
             "--points",
         )
     if refined.clock.offset_std_s > _MOST_CLOCK_S:
-        raise _untold(
+        raise _undetermined(
             names, f"it tells the clock to ± {1e3 * refined.clock.offset_std_s:.0f} ms only: record longer"
         )
 
@@ -252,7 +254,7 @@ def _in_one_lane(second: SensorTracks, matched: MatchedTracks) -> bool:
     return bool(high - low < _ONE_LANE)
 
 
-def _untold(names: tuple[str, str], why: str) -> DataError:
+def _undetermined(names: tuple[str, str], why: str) -> DataError:
     return DataError(
         f"the traffic does not tell how sensors {names[0]!r} and {names[1]!r} lie to each other: {why}"
     )

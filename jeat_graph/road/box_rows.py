@@ -81,8 +81,8 @@ def rows_of_table(
     extent = np.maximum(boxes[:, 2:], 1e-3)
     z = np.concatenate([boxes[:, :2] + extent / 2.0, np.log(extent)], axis=1)
     side = config.side_px**2 + (config.side_share * extent) ** 2
-    told = np.nan_to_num(stated)
-    total = np.concatenate([side / 2.0 + told[:, :2], (2.0 * side + told[:, 2:]) / extent**2], axis=1)
+    given = np.nan_to_num(stated)
+    total = np.concatenate([side / 2.0 + given[:, :2], (2.0 * side + given[:, 2:]) / extent**2], axis=1)
     rows = BoxRows(
         np.asarray(t, dtype=np.float64),
         z,

@@ -156,8 +156,8 @@ def _georeference(tree: Mapping[str, Any], path: str | Path) -> Georeference | N
 def _number(tree: Mapping[str, Any], name: str, path: str | Path, default: float | None = None) -> float:
     value = tree.get(name, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
-        said = f"must be a finite number, got {value!r}"[:_SHOWN] if name in tree else "is missing"
-        raise DataError(f"{name} {said}", path)
+        fault = f"must be a finite number, got {value!r}"[:_SHOWN] if name in tree else "is missing"
+        raise DataError(f"{name} {fault}", path)
     return float(value)
 
 

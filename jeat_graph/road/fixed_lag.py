@@ -75,7 +75,7 @@ class _Window:
         priors: what is known of the first state and the size by what came before.
         belief: mean (3,) and covariance (3, 3) of sizes of vehicles of its kind.
         solution: the last one, and the rows that it solves.
-        gone: states that have left since.
+        dropped: states that have left since.
     """
 
     rows: BoxRows
@@ -85,7 +85,7 @@ class _Window:
     priors: list[PriorRows]
     belief: tuple[FloatArray, FloatArray]
     solution: tuple[SharedChain, ChainRows] | None = None
-    gone: int = 0
+    dropped: int = 0
 
 
 @dataclass(eq=False)
@@ -226,9 +226,9 @@ class RoadFixedLag:
             window.coefficients = coefficients_of(solved)
             window.size = window.size + size_step(window.size, solved.shared) * (solved.shared - window.size)
             own = np.linalg.inv(solved.shared_cov) - W.T @ W
-            told = np.linalg.solve(solved.shared_cov, solved.shared) - W.T @ W @ mean
-            window.belief = sizes_allowed(own, told)
-            window.solution, window.gone = (solved, system[0]), 0
+            own_part = np.linalg.solve(solved.shared_cov, solved.shared) - W.T @ W @ mean
+            window.belief = sizes_allowed(own, own_part)
+            window.solution, window.dropped = (solved, system[0]), 0
         return bool(np.isfinite(window.coefficients).all())
 
 
@@ -239,14 +239,14 @@ def _leave(identity: int, window: _Window, until: float) -> RecordArray:
         count = min(count, len(window.keys) - 2)
     if count <= 0 or window.solution is None:
         return np.empty(0, dtype=ROAD_ROW)
-    (solved, system), first = window.solution, window.gone
+    (solved, system), first = window.solution, window.dropped
     out = _rows(identity, window.keys[:count], solved, first)
     if until < math.inf:
         # The last solution's rows, linearised where it was, stand for the boxes from now on.
         window.priors = [known_of_last(system.take(first, first + count), window.priors)]
         kept = np.searchsorted(window.rows.t, window.keys[count], side="right")
         window.rows = window.rows.take(slice(kept, None))
-        window.gone += count
+        window.dropped += count
         window.keys = window.keys[count:]
         window.coefficients = np.ascontiguousarray(window.coefficients[:, 3 * count :])
     return out

@@ -87,7 +87,7 @@ class RoadFile:
     def __init__(self, path: str | Path, table: RoadLagTable, over: Callable[[], bool] = never) -> None:
         self._path, self._table, self._over = Path(path), table, over
         self._reported: set[int] = set()
-        self._look_again_at = _FEW
+        self._prune_at = _FEW
         if self._path.is_dir():
             raise DataError("is a folder; --road must name a file", path)
 
@@ -114,9 +114,9 @@ class RoadFile:
         """
         self._reported.update(reported.tolist())
         self._append(self._table.step(t, rows))
-        if len(self._reported) > self._look_again_at:  # those that are gone are not remembered for ever
+        if len(self._reported) > self._prune_at:  # those that are gone are not remembered for ever
             self._reported &= self._table.held().union(reported.tolist())
-            self._look_again_at = max(2 * len(self._reported), _FEW)
+            self._prune_at = max(2 * len(self._reported), _FEW)
 
     def _append(self, columns: Columns) -> None:
         known = np.array([k in self._reported for k in columns["track_id"].tolist()], dtype=np.bool_)

@@ -58,12 +58,12 @@ class LinePassage(NamedTuple):
 class _Way:
     """Places of a track near the line: time, distance beyond the line (m), share of the line, x and y (m)."""
 
-    __slots__ = ("crossed", "kind", "places", "told")
+    __slots__ = ("crossed", "kind", "places", "reported")
 
     def __init__(self) -> None:
         self.places: list[tuple[float, float, float, float, float]] = []
         self.crossed: float | None = None
-        self.told = False
+        self.reported = False
         self.kind = ""
 
 
@@ -111,11 +111,11 @@ class LineWatch:
         for k in np.flatnonzero(seen):
             way = self._ways.setdefault(int(table.track_id[k]), _Way())
             way.kind = "" if table.classes is None else str(table.classes[k])
-            if not way.told:
+            if not way.reported:
                 self._goes(
                     way, t, (float(beyond[k]), float(share[k]), float(place[k, 0]), float(place[k, 1]))
                 )
-        return [one for one in map(self._told, [t] * len(self._ways), list(self._ways)) if one is not None]
+        return [one for one in map(self._passage, [t] * len(self._ways), list(self._ways)) if one is not None]
 
     def _goes(self, way: _Way, t: float, place: tuple[float, float, float, float]) -> None:
         """Add a place; the line is passed between two of them."""
@@ -130,16 +130,16 @@ class LineWatch:
                     way.crossed = before[0] + part * (t - before[0])
             way.places = [one for one in way.places if one[0] >= t - 2.0 * _REACH_S]
 
-    def _told(self, now: float, identity: int) -> LinePassage | None:
+    def _passage(self, now: float, identity: int) -> LinePassage | None:
         """What is to be told of a track now; one that has ended is forgotten."""
         way = self._ways[identity]
         last = way.places[-1][0] if way.places else now
         ended = now - last > _ENDED_S or now < last - _ENDED_S
         if ended:
             del self._ways[identity]
-        if way.told or way.crossed is None or not (ended or last >= way.crossed + _REACH_S):
+        if way.reported or way.crossed is None or not (ended or last >= way.crossed + _REACH_S):
             return None
-        way.told = True
+        way.reported = True
         found = self._fitted(identity, way)
         way.places = way.places[-1:]
         return found
@@ -184,16 +184,16 @@ class LineWatch:
     def state(self) -> list[list[Any]]:
         """Return what `set_state` takes: plain data."""
         return [
-            [identity, way.crossed, way.told, way.kind, [list(one) for one in way.places]]
+            [identity, way.crossed, way.reported, way.kind, [list(one) for one in way.places]]
             for identity, way in self._ways.items()
         ]
 
     def set_state(self, state: list[list[Any]]) -> None:
         """Go on from what `state` returned."""
         self._ways = {}
-        for identity, crossed, told, kind, places in state:
+        for identity, crossed, reported, kind, places in state:
             way = self._ways.setdefault(int(identity), _Way())
-            way.crossed, way.told, way.kind = crossed, bool(told), str(kind)
+            way.crossed, way.reported, way.kind = crossed, bool(reported), str(kind)
             way.places = [tuple(one) for one in places]
 
 

@@ -27,7 +27,7 @@ LEAST_PLACES = 4
 _MOST_LEFT_PX = 2.0
 # The map must be known to this share of the common picture's width.
 _MOST_UNSURE = 0.004
-_UNTOLD = "the places do not tell the second camera"
+_UNDETERMINED = "the places do not tell the second camera"
 _GRID = 6
 _TALL_PX = 40.0  # of the boxes by which maps are compared
 
@@ -71,7 +71,7 @@ def camera_by_pattern(
             board, ours, theirs, K1, bent, K2, bent2, size, flags=cv2.CALIB_FIX_INTRINSIC
         )
     except cv2.error:
-        raise DataError(f"{_UNTOLD}: tilt the pattern at each in another way") from None
+        raise DataError(f"{_UNDETERMINED}: tilt the pattern at each in another way") from None
     k = np.asarray(bent2).ravel()
     try:
         second = RoadCamera(
@@ -81,7 +81,7 @@ def camera_by_pattern(
             position=first.position - first.rotation.T @ R.T @ np.asarray(T).ravel(),
         )
     except DataError as error:
-        raise DataError(f"{_UNTOLD}: {error.message}") from None
+        raise DataError(f"{_UNDETERMINED}: {error.message}") from None
     return second, float(left)
 
 
@@ -118,7 +118,7 @@ def map_by_pattern(
     apart = np.stack(without) - np.mean(without, axis=0)
     good = np.isfinite(apart).all(axis=(0, 2))
     if not good.any():
-        raise DataError(f"{_UNTOLD}: show the pattern at more of them")
+        raise DataError(f"{_UNDETERMINED}: show the pattern at more of them")
     unsure = float(np.sqrt((count - 1) / count * (apart[:, good] ** 2).sum(axis=0).mean()))
     if unsure > _MOST_UNSURE * first.width:
         raise DataError(

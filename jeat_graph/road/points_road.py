@@ -14,7 +14,7 @@ from jeat_graph.road.inputs import PointTable, RoadMarks
 from jeat_graph.road.lanes import LaneConfig, find_lanes, given_lanes
 from jeat_graph.road.motion_fit import MotionFitConfig
 from jeat_graph.road.results import NO_SIZE, TOO_LITTLE, LeftOut, RoadResult
-from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle, told
+from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle, reported_speed
 
 if TYPE_CHECKING:
     from jeat_graph.road.boxes_road import SizedVehicle
@@ -105,13 +105,15 @@ def summarise(
     crossings, speeds = [], []
     for k, vehicle in enumerate(vehicles):
         own = [(name, crossing(vehicle, line)) for name, line in ends.items() if line is not None]
-        found = [(name, k, one._replace(speed=told(one.speed))) for name, one in own if one is not None]
+        found = [
+            (name, k, one._replace(speed=reported_speed(one.speed))) for name, one in own if one is not None
+        ]
         crossings += found
         start, end = vehicle.fit.window()
         times = sorted(one.t for _, _, one in found)
         if len(times) > 1 and times[-1] > times[0]:
             start, end = times[0], times[-1]
-        speeds.append(told(vehicle.mean_speed(start, end)))
+        speeds.append(reported_speed(vehicle.mean_speed(start, end)))
     return RoadResult(
         vehicles=vehicles,
         sizes=[one.size for one in sized] if sized else [NO_SIZE] * len(vehicles),

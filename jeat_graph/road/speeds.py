@@ -63,12 +63,12 @@ _MOST_REACH_KMH, _MOST_REACH_SHARE = 10.0, 0.5
 UNKNOWN_SPEED = Speed(math.nan, math.nan, math.nan, math.nan, math.nan)
 
 
-def told(speed: Speed) -> Speed:
+def reported_speed(speed: Speed) -> Speed:
     """Return a speed, or `UNKNOWN_SPEED` where next to nothing is known of it."""
-    return speed if is_told(speed.kmh, speed.high_kmh - speed.kmh) else UNKNOWN_SPEED
+    return speed if is_reported(speed.kmh, speed.high_kmh - speed.kmh) else UNKNOWN_SPEED
 
 
-def is_told(kmh: float, reach_kmh: float) -> bool:
+def is_reported(kmh: float, reach_kmh: float) -> bool:
     """Whether enough is known of a speed (km/h) whose 95 % interval reaches so far to either side."""
     return reach_kmh <= max(_MOST_REACH_KMH, _MOST_REACH_SHARE * kmh)
 

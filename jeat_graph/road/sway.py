@@ -90,8 +90,8 @@ def _shifts(
     """
     z, variance = log["z"][rows, axis], log["r"][rows, axis] + log["coloured_std"][rows, axis] ** 2
     count = np.bincount(place, minlength=times)
-    told: BoolArray = count >= _LEAST_STANDING
-    if told.sum() < _LEAST_TIMES:
+    known: BoolArray = count >= _LEAST_STANDING
+    if known.sum() < _LEAST_TIMES:
         return np.zeros(times)
     # The noise that the log tells may be that of the tracker's first guess: only its ratios are taken.
     relative, shift = 1.0 / variance, np.zeros(times)
@@ -103,8 +103,8 @@ def _shifts(
         total = np.bincount(place, weight * rest, minlength=times)
         alone = total / np.maximum(information, _LEAST_INFORMATION)
         scale = float((weight * (rest - alone[place]) ** 2).sum()) / free
-        noise = scale * float((1.0 / information[told]).mean())
-        second = float((alone[told] ** 2).mean())
+        noise = scale * float((1.0 / information[known]).mean())
+        second = float((alone[known] ** 2).mean())
         if second < _SURE * noise:
             return np.zeros(times)
         shift = total / (information + scale / (second - noise))

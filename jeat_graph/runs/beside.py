@@ -76,8 +76,10 @@ def with_picture(config: Config, overrides: Sequence[str], facts: Facts | None) 
     Returns:
         The configuration, and a line that says what was taken, or none.
     """
-    said = any(text.strip().startswith("image.") or text.strip().startswith("image=") for text in overrides)
-    if said or facts is None or facts.size_px is None:
+    size_given = any(
+        text.strip().startswith("image.") or text.strip().startswith("image=") for text in overrides
+    )
+    if size_given or facts is None or facts.size_px is None:
         return config, []
     width, height = facts.size_px
     known = config.input.picture == "given"

@@ -24,7 +24,7 @@ LEAST_S = 0.02
 # So many pairs of boxes are compared in one step where somebody waits for it (a millisecond or less).
 _PAIRS_A_STEP = 25_000
 #: That much of a recording is looked at for the exact offset (s): a tracker needs a few seconds for it.
-LOOKED_AT_S = 90.0
+COMPARED_S = 90.0
 # Sensors contradict each other where each sees so many vehicles drive, most of them where the other one sees
 # some, and their boxes agree at no difference of the clocks.
 _MANY, _SAME_PLACES, _NEVER = 10, 0.6, 0.08
@@ -70,7 +70,7 @@ def compare_in_steps(
         second: of the other.
         pair: names of both.
         latest_s: only the latest so much is tracked for the exact offset (s), and steps are kept short; by
-            default the first `LOOKED_AT_S` is.
+            default the first `COMPARED_S` is.
         exactly: whether boxes that agree as the times are may show a small difference all the same: where the
             clocks were right before, and one may have drifted.
     """
@@ -111,7 +111,7 @@ def _exactly(
     begin = max(first.scan_t[0], second.scan_t[0] - offset_s)
     end = min(first.scan_t[-1], second.scan_t[-1] - offset_s)
     if latest_s is None:
-        end = min(end, begin + LOOKED_AT_S)
+        end = min(end, begin + COMPARED_S)
     else:
         begin = max(begin, end - latest_s)
     ours = yield from own_tracks_in_steps(_between(first, begin, end))
@@ -138,7 +138,7 @@ def _contradiction(
     moving = []
     for one in (first, second):
         begin = float(one.scan_t[0] if latest_s is None else one.scan_t[-1] - latest_s)
-        tracks: SensorTracks = yield from own_tracks_in_steps(_between(one, begin, begin + LOOKED_AT_S))
+        tracks: SensorTracks = yield from own_tracks_in_steps(_between(one, begin, begin + COMPARED_S))
         moving.append(int(tracks.moves.sum()))
     if min(moving) < _MANY:
         return ""
@@ -164,7 +164,7 @@ def _same_places(first: Detections, second: Detections) -> bool:
     return min(shares) > _SAME_PLACES
 
 
-def said_of(name: str, lag_s: float, std_s: float) -> str:
+def summary_of(name: str, lag_s: float, std_s: float) -> str:
     """Say what is taken off a sensor's times."""
     return (
         f"sensor {name!r}: its times are {lag_s:.4f} s late beside those of the others "

@@ -15,7 +15,13 @@ from jeat_graph.config.schema import Config, SensorConfig
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.in_steps import run_through
-from jeat_graph.runs.clock_comparison import FoundClock, compare_in_steps, said_of, taken_off_each, unsure_of
+from jeat_graph.runs.clock_comparison import (
+    FoundClock,
+    compare_in_steps,
+    summary_of,
+    taken_off_each,
+    unsure_of,
+)
 from jeat_graph.runs.latency import taken_off
 
 # Lags of one sensor in several recordings are one where they differ by no more (s).
@@ -62,7 +68,7 @@ def find_clocks(
     if not ahead:
         return detections, {}, lines
     taken = taken_off_each(wanted, ahead)
-    lines += [said_of(name, one.lag_s, one.std_s) for name, one in taken.items()]
+    lines += [summary_of(name, one.lag_s, one.std_s) for name, one in taken.items()]
     record = {name: {"lag_s": one.lag_s, "std_s": one.std_s} for name, one in taken.items()}
     return taken_off(detections, {name: one.lag_s for name, one in taken.items()}), record, lines
 
@@ -87,8 +93,8 @@ def with_clocks(
     found: dict[str, list[float]] = {}
     lines: list[str] = []
     for recording, name in zip(recordings, names, strict=True):
-        _, taken, said = find_clocks(recording, config, name)
-        lines += said
+        _, taken, notes = find_clocks(recording, config, name)
+        lines += notes
         for sensor in recording.sensors:
             found.setdefault(sensor, []).append(taken.get(sensor, {}).get("lag_s", 0.0))
     sensors = dict(config.sensors)

@@ -14,10 +14,10 @@ from jeat_graph.runs.tracking_run import write_run
 
 if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
-    from jeat_graph.io.tables.sensor_columns import Said
+    from jeat_graph.io.tables.sensor_columns import Declared
 
 #: The configuration that takes what tables say of their detectors.
-TOLD_CONFIG = "default"
+DECLARING_CONFIG = "default"
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class TrackRequest:
             return self, facts
         return replace(self, rate_hz=facts.rate_hz), facts
 
-    def said(self) -> Said:
+    def declared(self) -> Declared:
         """Return what the detections' own tables say of their detectors (`sensor_columns`).
 
         Another configuration than `default`, a preset or the user's own, says itself what its sensors are.
@@ -101,9 +101,9 @@ class TrackRequest:
             DataError: a table cannot be read, or says two things of one sensor.
         """
         from jeat_graph.io.tables.detections_io import split_name
-        from jeat_graph.io.tables.sensor_columns import said_by_all
+        from jeat_graph.io.tables.sensor_columns import declared_by_all
 
-        return said_by_all(map(split_name, self.detections)) if self.config == TOLD_CONFIG else {}
+        return declared_by_all(map(split_name, self.detections)) if self.config == DECLARING_CONFIG else {}
 
     def configured(self) -> tuple[Config, list[str]]:
         """Load the configuration, with what the detections say, and what files beside them say.
@@ -118,13 +118,13 @@ class TrackRequest:
         from jeat_graph.config.reading import load_config
         from jeat_graph.io.tables.sensor_columns import as_settings
 
-        said = self.said()
+        declared = self.declared()
         notes = [
             f"sensor {name!r}: {_words(keys)}, as the detections say (--set sensors.{name}.… otherwise)"
-            for name, keys in said.items()
+            for name, keys in declared.items()
             if not self.detectors  # what has just detected has said it
         ]
-        config = load_config(self.config, [*as_settings(said), *self.overrides], self.rig)
+        config = load_config(self.config, [*as_settings(declared), *self.overrides], self.rig)
         if self.rig is not None and config.input.picture == "given":
             return config, notes  # the frames are one sensor's picture
         config, more = with_picture(config, self.overrides, self.with_facts()[1])

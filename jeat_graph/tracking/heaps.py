@@ -25,7 +25,7 @@ class Heaps:
 
     def __init__(self, engine: str, constants: ModelConstants) -> None:
         self._engine, self._constants = engine, constants
-        self._said: set[str] = set()
+        self._noted: set[str] = set()
         self._quiet = False
 
     def kept(self, batch: Sequence[Scan]) -> BoolArray | None:
@@ -57,7 +57,7 @@ class Heaps:
         return out
 
     def _say(self, scan: Scan, kept: int) -> None:
-        if self._quiet or scan.sensor in self._said:
+        if self._quiet or scan.sensor in self._noted:
             return
         c = self._constants
         # Up from here: a scan, all scans, the tracker's `take_in`, `step` with its lock, and its caller.
@@ -69,4 +69,4 @@ class Heaps:
             InputWarning,
             stacklevel=7,
         )
-        self._said.add(scan.sensor)
+        self._noted.add(scan.sensor)

@@ -61,10 +61,10 @@ class Updates:
         Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
         """
         found = boxes_of(source, scores, classes, format)
-        looks = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
+        vectors = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
         own = is_supervision(source)
         self.logs_assigned = self.logs_assigned or own
-        scan = Scan(t, sensor, found.boxes, found.scores, found.classes, looks)
+        scan = Scan(t, sensor, found.boxes, found.scores, found.classes, vectors)
         self._class_ids = {**self._class_ids, **found.class_ids}
         table = self.step(scan)
         if not own:

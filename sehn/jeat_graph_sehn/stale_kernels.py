@@ -46,12 +46,12 @@ def drop_stale(folders: Mapping[str, Path], cache: Path | None = None) -> int:
     if now == before:
         return 0
     changed = {name for name in now.keys() | before.keys() if now.get(name) != before.get(name)}
-    gone = 0
+    count = 0
     for name in _importers(sources, changed):
         if name in sources:
-            gone += _remove(sources[name], cache)
+            count += _remove(sources[name], cache)
     _write(record, now)
-    return gone
+    return count
 
 
 def _find(folder: str, package: str, sources: dict[str, str], stamps: Stamps) -> None:

@@ -208,9 +208,9 @@ class LagChain:
         assert window is not None, "it has been extended"
         state = window.state[count:]
         first = int(state[0]) if len(state) else int(window.state[-1])
-        gone = first - window.first
+        dropped = first - window.first
         self._leaving += range(window.first, first)
-        kept = Reference(window.reference.mean[gone:], window.reference.root[gone:])
+        kept = Reference(window.reference.mean[dropped:], window.reference.root[dropped:])
         self._window = _InsideGtsam(first, state, kept)
 
 

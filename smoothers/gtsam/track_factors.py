@@ -24,7 +24,7 @@ from jeat_graph.smoothers.filtered_track import FilteredTrack
 #: adds to the variance of the smoothed states is as small.
 LEAST_NOISE = 1e-12
 # Of a measurement that told less, in units of what was known before, nothing is left but rounding.
-_LEAST_TOLD = 1e-12
+_LEAST_PRECISION = 1e-12
 # A pivot is at least this share of its variance.
 _LEAST_PIVOT = 1e-15
 
@@ -144,13 +144,13 @@ def _measured(track: FilteredTrack, state: IntArray, reference: Reference, befor
     root, m = before[rows - 1], track.mean[rows]
     V, left, _ = np.linalg.svd(forward(root, cholesky(track.covariance[rows])))
     share = np.minimum(left, 1.0) ** 2  # of the variance, that is left
-    told = np.maximum((1.0 - share) / share, _LEAST_TOLD)
+    precision = np.maximum((1.0 - share) / share, _LEAST_PRECISION)
     d = forward(root, (m - track.predicted_mean[rows])[..., None])
     apart = forward(root, (reference.mean[state[rows]] - m)[..., None])
-    Vt, s = np.swapaxes(V, -1, -2), np.sqrt(told)[..., None]
+    Vt, s = np.swapaxes(V, -1, -2), np.sqrt(precision)[..., None]
     A = s * (Vt @ forward(root, reference.root[state[rows]]))
     b = ((Vt @ d) / s - s * (Vt @ apart))[..., 0]
-    known = 1.0 - share > _LEAST_TOLD
+    known = 1.0 - share > _LEAST_PRECISION
     return [
         Rows(int(k), i, A[n, i][known[n, i]], b[n, i][known[n, i]])
         for n, k in enumerate(rows)

@@ -115,4 +115,4 @@ def test_a_box_that_the_edge_has_cut_fits_its_track():
     # A side at the edge that lies further out than expected is measured as any other.
     wider = np.array([[195.0, 300.0, 300.0, 360.0]])
     out = box_sides.innovations(mean, P, wider, edges, 2.0 * np.log(0.06), C)
-    assert not out.gone.any()
+    assert not out.unmeasured.any()

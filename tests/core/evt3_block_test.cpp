@@ -9,7 +9,7 @@ using namespace jeat::events::evt3;
 
 namespace {
 
-bool alike(const Block& one, const Block& other) {
+bool equal(const Block& one, const Block& other) {
     if (one.row != other.row || one.first != other.first || one.emit != other.emit || one.plain != other.plain) {
         return false;
     }
@@ -40,9 +40,9 @@ int main() {
             if (rare && turn % 2 != 0) word = static_cast<std::uint16_t>(EVENT << 12 | (word & 0xFFF));
         }
         Block at_once, one_by_one;
-        look_at(words.data(), high, low, at_once);
-        look_one_by_one(words.data(), high, low, one_by_one);
-        if (!alike(at_once, one_by_one)) {
+        classify(words.data(), high, low, at_once);
+        classify_one_by_one(words.data(), high, low, one_by_one);
+        if (!equal(at_once, one_by_one)) {
             std::printf("block %d is seen otherwise at once than word by word\n", turn);
             return 1;
         }

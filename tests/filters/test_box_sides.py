@@ -175,10 +175,10 @@ def test_a_box_that_leaves_keeps_its_size_and_its_other_sides_measure(shown):
     cut = np.array([[0.0, 300.0, 100.0 * shown, 360.0]])
     edges = box_sides.at_edge(cut, PICTURE, C)
     seen = box_sides.innovations(mean, covariance, cut, edges, LOG_VARIANCE, C)
-    assert seen.gone[0, 0].tolist() == [[True, False], [False, False]]
-    y, S, gone, size = seen.y[:, 0], seen.S[:, 0], seen.gone[:, 0], singer.expected_size(mean)
-    R = box_sides.measured_variance(y, S, seen.side_variance, size, gone, C)
-    m, P, rest = box_sides.uncover(mean, covariance, y, S, gone, C)
+    assert seen.unmeasured[0, 0].tolist() == [[True, False], [False, False]]
+    y, S, unmeasured, size = seen.y[:, 0], seen.S[:, 0], seen.unmeasured[:, 0], singer.expected_size(mean)
+    R = box_sides.measured_variance(y, S, seen.side_variance, size, unmeasured, C)
+    m, P, rest = box_sides.uncover(mean, covariance, y, S, unmeasured, C)
     after, _ = box_sides.update(m, P, rest, seen.H, R)
     want = [100.0 * (shown - 1.0), 300.0, 100.0 * shown, 360.0]
     np.testing.assert_allclose(box_sides.expected_corners(after)[0], want, atol=1.0)
@@ -190,8 +190,8 @@ def test_a_side_that_measures_nothing_is_no_measurement():
     box = BOX + np.array([15.0, 2.0, 3.0, -1.0])
     edges = np.array([[[True, False], [False, False]]])
     seen = box_sides.innovations(mean, covariance, box, edges, LOG_VARIANCE, C)
-    gone, size = seen.gone[:, 0], singer.expected_size(mean)
-    R = box_sides.measured_variance(seen.y[:, 0], seen.S[:, 0], seen.side_variance, size, gone, C)
+    unmeasured, size = seen.unmeasured[:, 0], singer.expected_size(mean)
+    R = box_sides.measured_variance(seen.y[:, 0], seen.S[:, 0], seen.side_variance, size, unmeasured, C)
     got, grown = box_sides.update(mean, covariance, seen.y[:, 0], seen.H, R)
     H, P, r = seen.H[0, 0, 1], covariance[0, 0], R[0, 0, 1]
     gain = P @ H / (H @ P @ H + r)

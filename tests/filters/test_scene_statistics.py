@@ -112,7 +112,7 @@ def test_a_box_that_overlaps_a_better_one_is_less_likely_an_object(seed):
     rng = np.random.default_rng(seed)
     corner, logits = rng.uniform(0, 60, (12, 2)), rng.normal(0.0, 1.5, 12)
     boxes = np.concatenate([corner, corner + rng.uniform(10, 40, (12, 2))], axis=1)
-    found = score_calibration.box_probability(boxes, logits, -0.7)
+    found = score_calibration.box_probability(boxes, logits, 0.7)
     for j, (left, top, right, bottom) in enumerate(boxes):
         apart = 1.0
         for k, other in enumerate(boxes):

@@ -10,7 +10,7 @@ from jeat_graph.config.reading import load_config
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.io.tables.detections_io import read_detections, write_detections
-from jeat_graph.io.tables.sensor_columns import as_settings, said_by, said_by_all
+from jeat_graph.io.tables.sensor_columns import as_settings, declared_by, declared_by_all
 from jeat_graph.runs.directory import read_record
 
 KNOWN = {"rgb": {"even_score": 0.45, "latency_s": 0.0093}, "cam 7.1": {"even_score": 0.3}}
@@ -28,29 +28,29 @@ def recording(names=("rgb", "cam 7.1", "bare")):
 @pytest.mark.parametrize("name", ["d.csv", "d.parquet"])
 def test_what_is_known_comes_back_and_the_boxes_stay(tmp_path, name):
     path = tmp_path / name
-    write_detections(recording(), path, said=KNOWN)
-    assert said_by(path) == KNOWN
+    write_detections(recording(), path, declared=KNOWN)
+    assert declared_by(path) == KNOWN
     again, plain = read_detections(path), recording()
     np.testing.assert_array_equal(again.boxes, plain.boxes)
     assert again.sensors == plain.sensors
     write_detections(plain, path)
-    assert said_by(path) == {}
+    assert declared_by(path) == {}
 
 
 def test_values_of_any_kind_come_back(tmp_path):
     clock = {"clock": {"offset_s": 0.1, "at_s": 3.0}, "image": [640.0, 480.0]}
-    write_detections(recording(("rgb",)), tmp_path / "d.csv", said={"rgb": clock})
-    assert said_by(tmp_path / "d.csv") == {"rgb": clock}
+    write_detections(recording(("rgb",)), tmp_path / "d.csv", declared={"rgb": clock})
+    assert declared_by(tmp_path / "d.csv") == {"rgb": clock}
     known = load_config("default", as_settings({"rgb": clock})).sensors["rgb"]
     assert (known.clock.offset_s, known.image) == (0.1, (640.0, 480.0))
 
 
 def test_rows_may_be_filtered_and_a_sensor_renamed(tmp_path):
     path = tmp_path / "d.csv"
-    write_detections(recording(("rgb",)), path, said=KNOWN)
+    write_detections(recording(("rgb",)), path, declared=KNOWN)
     head, *lines = path.read_text().splitlines()
     path.write_text("\n".join([head, *lines[7:]]) + "\n")
-    assert said_by(path, "north") == {"north": KNOWN["rgb"]}
+    assert declared_by(path, "north") == {"north": KNOWN["rgb"]}
 
 
 def test_settings_of_a_name_with_dots_are_taken():
@@ -72,7 +72,7 @@ def test_what_cannot_be_meant_is_refused_with_its_line(tmp_path, header, value, 
     rows = [f"{k / 10},rgb,1,2,3,4,.9,{value if k == 2 else 0.45}" for k in range(4)]
     path.write_text("\n".join([f"t,sensor,left,top,width,height,score,{header}", *rows]) + "\n")
     with pytest.raises(DataError, match=message):
-        said_by(path)
+        declared_by(path)
 
 
 def test_a_data_frame_says_it_too(tmp_path):
@@ -81,7 +81,7 @@ def test_a_data_frame_says_it_too(tmp_path):
     from jeat_graph import track
 
     path = tmp_path / "d.csv"
-    write_detections(recording(("rgb",)), path, said={"rgb": {"even_score": 0.9}})
+    write_detections(recording(("rgb",)), path, declared={"rgb": {"even_score": 0.9}})
     told, frame = track(path, image=(640, 480)), track(pd.read_csv(path), image=(640, 480))
     np.testing.assert_array_equal(told.causal.existence, frame.causal.existence)
     plain = track(recording(("rgb",)), image=(640, 480))
@@ -90,16 +90,16 @@ def test_a_data_frame_says_it_too(tmp_path):
 
 def test_two_files_must_agree_on_a_sensor(tmp_path):
     for name, even in (("a.csv", 0.45), ("b.csv", 0.4)):
-        write_detections(recording(("rgb",)), tmp_path / name, said={"rgb": {"even_score": even}})
+        write_detections(recording(("rgb",)), tmp_path / name, declared={"rgb": {"even_score": even}})
     with pytest.raises(DataError, match=r"b\.csv: sensor\.even_score of sensor 'rgb' is 0\.4, and 0\.45 in"):
-        said_by_all([(None, tmp_path / "a.csv"), (None, tmp_path / "b.csv")])
-    said = said_by_all([("one", tmp_path / "a.csv"), ("two", tmp_path / "b.csv")])
+        declared_by_all([(None, tmp_path / "a.csv"), (None, tmp_path / "b.csv")])
+    said = declared_by_all([("one", tmp_path / "a.csv"), ("two", tmp_path / "b.csv")])
     assert {name: keys["even_score"] for name, keys in said.items()} == {"one": 0.45, "two": 0.4}
 
 
 def test_track_takes_it_unless_the_user_or_another_configuration_says_otherwise(tmp_path, capsys):
     path, out = tmp_path / "d.csv", tmp_path / "run"
-    write_detections(recording(("rgb",)), path, said=KNOWN)
+    write_detections(recording(("rgb",)), path, declared=KNOWN)
 
     def even(*more):
         assert main(["track", str(path), "--image", "640x480", "--out", str(out), *more]) == 0

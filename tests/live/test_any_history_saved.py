@@ -59,7 +59,7 @@ def told(live, message, drains):
         arrival = live.step([scan_at(t, name, count) for name in names])
     except JeatGraphError as error:
         return str(error)
-    said = (arrival.t, arrival.late_s, arrival.anew, arrival.leapt)
+    said = (arrival.t, arrival.late_s, arrival.reset, arrival.leapt)
     scans = [
         [(scan.t, scan.sensor) for scan in some]
         for some in (arrival.dropped, arrival.repeated, arrival.held, arrival.refuted, arrival.taken)

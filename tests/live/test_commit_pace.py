@@ -18,7 +18,7 @@ from jeat_graph.live.service.log import Log
 from jeat_graph.live.service.run import Service, _Running
 from jeat_graph.live.service.status import EndStatus
 from jeat_graph.live.session import Ends, Session
-from jeat_graph.live.told import BadLines
+from jeat_graph.live.session_warnings import BadLines
 from jeat_graph.live.transport.notices import Notices
 
 

@@ -152,7 +152,7 @@ def test_a_clock_that_is_set_back_lets_time_begin_anew_and_what_was_learnt_stays
         live.step(scan)
     learnt, born = live.tracker.sensor_states(), live.tracker.num_born
     anew = [live.step(Scan(scan.t - 500.0, *_rest(scan))) for scan in traffic(times=60)]
-    assert any(one.anew for one in anew)
+    assert any(one.reset for one in anew)
     assert live.time < 0.0
     assert live.tracker.num_born > born
     assert live.causal().track_id.min() > born

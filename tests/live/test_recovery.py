@@ -189,7 +189,7 @@ def test_wrong_messages_that_were_believed_cost_as_many_or_five_seconds(count, l
     """What waited is taken as well, so that only answers are lost: 3 to 100 of 400."""
     wrong = [both(1e9 + k / RATE_HZ) for k in range(count)]
     said, taken = steps(live_of(policy), [*in_order(0.0, 2.0), *wrong, *in_order(2.0, 20.0)])
-    assert [one.leapt for one in said].count(True) == [one.anew for one in said].count(True) == 1
+    assert [one.leapt for one in said].count(True) == [one.reset for one in said].count(True) == 1
     assert taken == 40 + count - 2 + 400 - lost
     assert said[-1].t == pytest.approx(22.0 - 1 / RATE_HZ)
     assert len(said[-1].table) == 1
@@ -204,7 +204,7 @@ def test_a_jump_that_is_believed_never_widens_the_bound():
         decision = base.decide(
             [scan_at(t)], now, now is not None and t < now - 0.3, {"rgb": now or 0.0, "evt": -math.inf}
         )
-        if decision.take and not decision.leapt and not decision.anew and t >= (now or t):
+        if decision.take and not decision.leapt and not decision.reset and t >= (now or t):
             base.took(now, t)
         if decision.take:
             now = decision.take[-1].t
@@ -228,7 +228,7 @@ def test_a_recording_of_three_seconds_in_a_loop_starts_anew_again_and_again(poli
     said, _ = steps(live_of(policy), [both(3.0 * (k % 60) / 60, number=k) for k in range(60 * 20)])
     gaps = [k for k, one in enumerate(said) if one.taken]
     assert max(b - a for a, b in pairwise(gaps)) <= 5.2 * RATE_HZ
-    assert sum(one.anew for one in said) > 4
+    assert sum(one.reset for one in said) > 4
 
 
 @pytest.mark.parametrize("step_s", [1e-6, 0.0])
@@ -236,7 +236,7 @@ def test_a_clock_that_hardly_moves_is_believed_after_a_thousand_messages(step_s)
     live = live_of()
     steps(live, in_order(500.0, 1.0))
     said, _ = steps(live, [both(100.0 + step_s * k, number=k) for k in range(1500)])
-    assert sum(one.anew for one in said) == (step_s > 0.0)  # of one that stands, all is the same scan
+    assert sum(one.reset for one in said) == (step_s > 0.0)  # of one that stands, all is the same scan
     assert len(live._base.row) <= 1000
 
 
@@ -266,7 +266,7 @@ def test_a_clock_that_was_set_back_while_nobody_ran_is_no_repetition(policy, tmp
     assert all(len(one.repeated) == 2 for one in said)
     rebooted = [both(k / RATE_HZ, -7.0, k + 13) for k in range(400)]
     said, taken = steps(again, rebooted)
-    assert sum(one.anew for one in said) == 1
+    assert sum(one.reset for one in said) == 1
     assert taken >= 400 - 110
     assert said[-1].t == pytest.approx(20.0 - 1 / RATE_HZ)
 

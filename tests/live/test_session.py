@@ -14,7 +14,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.messages import decode_scans
 from jeat_graph.live.session import Ends, Session
-from jeat_graph.live.told import MOST_TOLD
+from jeat_graph.live.session_warnings import MOST_WARNED
 from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.tracking.tracker import Tracker
 
@@ -59,7 +59,7 @@ def test_one_that_is_started_again_and_again_is_told_of_some_times():
     for k in range(20):
         session.accept(message(0, 0.5 * k))
     assert len(answered) == 20
-    assert len(said) == MOST_TOLD
+    assert len(said) == MOST_WARNED
     assert said[-1].endswith("further ones are only counted")
     assert session.summary_lines() == ["source 'g7' began to count its messages anew 19 times"]
 

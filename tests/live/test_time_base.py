@@ -87,7 +87,7 @@ def test_a_recording_that_pauses_for_an_hour_loses_nothing(alone, policy):
     assert_equal(said[-1].table, last)
     assert_equal(rows, tracker.finish())
     assert sum(bool(one.held) for one in said) <= 2
-    assert not any(one.dropped or one.refuted or one.anew for one in said)
+    assert not any(one.dropped or one.refuted or one.reset for one in said)
     assert live.lateness.summary()["rgb"].dropped == 0
 
 
@@ -105,9 +105,9 @@ def test_a_clock_that_is_set_back_begins_a_new_time(alone, policy, tmp_path):
     if alone:
         first, second = ([one for one in part if one.sensor == "rgb"] for part in (first, second))
     said, tables, rows, live = run([*first, *second], policy)
-    assert sum(one.anew for one in said) == 1
+    assert sum(one.reset for one in said) == 1
     assert not any(one.dropped or one.refuted for one in said), "what waited is taken"
-    begun = next(k for k, one in enumerate(said) if one.anew)
+    begun = next(k for k, one in enumerate(said) if one.reset)
     assert 1404.9 < said[begun].t < 1405.2
     assert live.time == second[-1].t
     # Tracks are other ones, with identities greater than all before; the smoothed rows have both times.
@@ -126,5 +126,5 @@ def test_late_scans_of_one_sensor_do_not_turn_time_back_while_another_goes_on():
     scans = both(100.0, 8.0, 100.0)
     wrong = [scan(one.t - 60.0, "evt") if one.sensor == "evt" and one.t > 101.0 else one for one in scans]
     said, _, _, _ = run(wrong)
-    assert not any(one.anew for one in said)
+    assert not any(one.reset for one in said)
     assert said[-1].t == pytest.approx(max(one.t for one in scans), abs=1e-3)

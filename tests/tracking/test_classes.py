@@ -39,7 +39,7 @@ def config(engine: str = "none"):
     return load_config("default", [f"smoother.engine={engine}", "smoother.lag_s=0.5"])
 
 
-def said_of(detections: Detections) -> list[tuple[float, int, str, float]]:
+def summary_of(detections: Detections) -> list[tuple[float, int, str, float]]:
     """Time, vehicle, class and score of all that has a class; a vehicle keeps to its half of the picture."""
     return [
         (float(scan.t), int(box[1] > 350.0), str(kind), float(score))
@@ -66,7 +66,7 @@ def vehicle_of(table, row: int) -> int:
 
 def test_a_causal_class_is_the_majority_by_score_of_what_had_come():
     detections = recording()
-    said, changed = said_of(detections), set()
+    said, changed = summary_of(detections), set()
     for table in Tracker(config()).run(detections):
         for row in range(len(table)):
             name, share = majority(said, vehicle_of(table, row), float(table.t[row]))
@@ -82,7 +82,7 @@ def test_smoothed_rows_have_the_class_of_all_that_their_track_took_in(engine):
     tracker = Tracker(config(engine))
     for batch in detections.batches():
         tracker.step(batch)
-    table, said = tracker.finish(), said_of(detections)
+    table, said = tracker.finish(), summary_of(detections)
     whole = engine == "full"
     for row in range(len(table)):
         t = float(table.t[row])

@@ -17,7 +17,12 @@ from jeat_graph.tracking.model_tracker import ModelTracker
 
 ENGINES = ("core", "reference", "paper")
 #: What an engine has beside its tracks.
-SAVES, FITS, WEIGHS, LOOKS = {"core"}, {"core", "reference"}, {"core", "reference"}, {"core", "reference"}
+SAVES, FITS, WEIGHS, BY_CONTENT = (
+    {"core"},
+    {"core", "reference"},
+    {"core", "reference"},
+    {"core", "reference"},
+)
 
 every_engine = pytest.mark.parametrize("engine", ENGINES)
 
@@ -151,12 +156,12 @@ def test_it_weighs_hypotheses_or_says_that_it_has_none(engine):
 def test_it_compares_looks_or_says_that_it_does_not(engine):
     tracker = tracked(engine)
     scan = (2.0, "rgb", [[0, 0, 5, 5]], [0.5], None, [[1.0, 0.0]])
-    if engine in LOOKS:
+    if engine in BY_CONTENT:
         tracker.step(scan)
     else:
         with pytest.raises(DataError, match="no embeddings"):
             tracker.step(scan)
-    assert tracker.time == (2.0 if engine in LOOKS else pytest.approx(1.45))
+    assert tracker.time == (2.0 if engine in BY_CONTENT else pytest.approx(1.45))
 
 
 def test_constants_of_the_model_are_none_of_the_papers():

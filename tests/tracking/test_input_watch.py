@@ -25,7 +25,7 @@ def seen(box: tuple[float, ...], step: float = 0.05, scans: int = 100, **setting
         warnings.simplefilter("always")
         for k in range(scans):
             boxes = np.array([box] * 3) * (1.0 + 0.01 * rng.random((3, 1)))
-            watch.look([Scan(step * k, "rgb", boxes, np.full(3, 0.9))])
+            watch.check([Scan(step * k, "rgb", boxes, np.full(3, 0.9))])
     assert all(issubclass(one.category, InputWarning) for one in caught)
     return [str(one.message) for one in caught]
 
@@ -116,7 +116,7 @@ def test_scans_that_are_taken_again_after_a_late_one_are_looked_at_once():
         warnings.simplefilter("error")
         for k in range(3):
             for j in range(k + 1):
-                watch.look([Scan(1e3 * j, "rgb", box, np.array([0.9]))])
+                watch.check([Scan(1e3 * j, "rgb", box, np.array([0.9]))])
     assert watch._times == {"rgb": [0.0, 1e3, 2e3]}
 
 

@@ -51,7 +51,7 @@ def run_both(oracle, batches):
                 identity[id(track)] = (now.track_id[np.argmin(new)], track)
         reference.tracks.sort(key=lambda track: identity[id(track)][0])
         assert [identity[id(track)][0] for track in reference.tracks] == now.track_id.tolist()
-        compare(reference.tracks, now, tracker.looked)
+        compare(reference.tracks, now, tracker.engine_sensors)
         confirmed = [track for track in reference.tracks if track.confirmed]
         assert np.allclose(table.mean, np.array([r.x for r in confirmed]).reshape(-1, 6), atol=1e-6)
         assert table.track_id.tolist() == [identity[id(r)][0] for r in confirmed]

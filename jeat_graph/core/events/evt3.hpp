@@ -99,9 +99,9 @@ private:
     // through pointers to bytes could else be any member, and each would be read again.
     JEAT_GRAPH_TWICE std::size_t take_block(const std::uint16_t* words) {
         Block block;
-        look_at(words, static_cast<unsigned>(high_), static_cast<unsigned>(low_), block);
-        const auto word_of_last = [words](std::uint64_t said) -> std::int64_t {
-            return words[std::countl_zero(said) ^ 63];
+        classify(words, static_cast<unsigned>(high_), static_cast<unsigned>(low_), block);
+        const auto word_of_last = [words](std::uint64_t mask) -> std::int64_t {
+            return words[std::countl_zero(mask) ^ 63];
         };
         const std::int64_t upper = time_ - low_, row_before = row_;
         const Limits limits = limits_;

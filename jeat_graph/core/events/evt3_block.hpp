@@ -41,8 +41,8 @@ struct Block {
     std::array<std::uint16_t, BLOCK_WORDS> low;  // low time at each word, up to the first that is not plain
 };
 
-// Looks at 64 words one by one: what `look_at` does, on processors that it has no instructions for.
-inline void look_one_by_one(const std::uint16_t* words, unsigned high, unsigned low, Block& block) {
+// Looks at 64 words one by one: what `classify` does, on processors that it has no instructions for.
+inline void classify_one_by_one(const std::uint16_t* words, unsigned high, unsigned low, Block& block) {
     block.row = block.first = block.emit = block.plain = 0;
     for (std::size_t k = 0; k < BLOCK_WORDS; ++k) {
         const unsigned word = words[k], kind = word >> 12, bits = word & 0xFFF;
@@ -71,7 +71,7 @@ struct Eight {
 };
 
 // Looks at eight words; `latest` is the low time before them, and then after them, in all lanes.
-inline Eight look_at_eight(const std::uint16_t* words, __m128i same_high, __m128i& latest, std::uint16_t* low) {
+inline Eight classify_eight(const std::uint16_t* words, __m128i same_high, __m128i& latest, std::uint16_t* low) {
     const auto all = [](int value) { return _mm_set1_epi16(static_cast<short>(value)); };
     const __m128i word = _mm_loadu_si128(reinterpret_cast<const __m128i*>(words));
     const __m128i kind = _mm_srli_epi16(word, 12);
@@ -96,13 +96,13 @@ inline Eight look_at_eight(const std::uint16_t* words, __m128i same_high, __m128
 }
 
 // Looks at 64 words: `high` and `low` are the time before them (0 to 4095).
-inline void look_at(const std::uint16_t* words, unsigned high, unsigned low, Block& block) {
+inline void classify(const std::uint16_t* words, unsigned high, unsigned low, Block& block) {
     const __m128i same_high = _mm_set1_epi16(static_cast<short>(TIME_HIGH << 12 | high));
     __m128i latest = _mm_set1_epi16(static_cast<short>(low));
     std::uint64_t row = 0, first = 0, emit = 0, plain = 0;
     for (std::size_t k = 0; k < BLOCK_WORDS; k += 16) {
-        const Eight one = look_at_eight(words + k, same_high, latest, block.low.data() + k);
-        const Eight other = look_at_eight(words + k + 8, same_high, latest, block.low.data() + k + 8);
+        const Eight one = classify_eight(words + k, same_high, latest, block.low.data() + k);
+        const Eight other = classify_eight(words + k + 8, same_high, latest, block.low.data() + k + 8);
         row |= bits_of(one.row, other.row) << k;
         first |= bits_of(one.first, other.first) << k;
         emit |= bits_of(one.emit, other.emit) << k;
@@ -114,8 +114,8 @@ inline void look_at(const std::uint16_t* words, unsigned high, unsigned low, Blo
     block.plain = plain;
 }
 #else
-inline void look_at(const std::uint16_t* words, unsigned high, unsigned low, Block& block) {
-    look_one_by_one(words, high, low, block);
+inline void classify(const std::uint16_t* words, unsigned high, unsigned low, Block& block) {
+    classify_one_by_one(words, high, low, block);
 }
 #endif
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.box_text import KNOWN, sides_of
-from jeat_graph.data.class_columns import CLASS_COLUMNS, name_classes, said_classes
+from jeat_graph.data.class_columns import CLASS_COLUMNS, declared_classes, name_classes
 from jeat_graph.data.column_names import (
     BOX,
     BOX_TEXT,
@@ -137,7 +137,7 @@ def classes_of(table: FileTable, names: Mapping[int, str] | None) -> TextArray |
         names: of classes by number, for a table that numbers them; or None.
     """
     found = {name: table.text(name, blank_ok=True) for name in CLASS_COLUMNS if name in table}
-    classes = said_classes(found)
+    classes = declared_classes(found)
     if classes is None or not (classes != "").any():
         return None
     return name_classes(classes, names)
@@ -145,8 +145,8 @@ def classes_of(table: FileTable, names: Mapping[int, str] | None) -> TextArray |
 
 def _another_unit(table: FileTable, found: str, unit: str) -> DataError:
     """The error of times that have a unit themselves, and get another one from the user."""
-    said = "time_unit" if table.path is None else "--time-unit"
-    return DataError(f"{found}, but {said} says {unit}; leave it out", table.path)
+    option = "time_unit" if table.path is None else "--time-unit"
+    return DataError(f"{found}, but {option} says {unit}; leave it out", table.path)
 
 
 def _frame_numbers(table: FileTable, name: str) -> IntArray:

@@ -91,15 +91,15 @@ def rows_of_detections(
     scores = table.number("score", blank_ok=True) if "score" in table else np.where(empty, np.nan, 1.0)
     scores = scale_scores(scores, how.score_scale, table.path) if "score" in table else scores
     classes = classes_of(table, names)
-    looks = read_embeddings(table) if "embedding" in table else None
+    embedded = read_embeddings(table) if "embedding" in table else None
     flat = without_area(boxes) & ~empty
     check_rows(boxes, scores, empty | flat, table.error)
     motions = read_motions(table) if CAMERA_MOTION in table else None
     rows = DetectionRows(
-        t, named, code, boxes, scores, classes, empty | flat, looks, motions, int(flat.sum()), times.count
+        t, named, code, boxes, scores, classes, empty | flat, embedded, motions, int(flat.sum()), times.count
     )
     fills = times.frames is not None and "sensor" not in table and not empty.any() and how.fill_empty
-    return _with_frames_between(rows, times, how, table) if fills and len(t) and looks is None else rows
+    return _with_frames_between(rows, times, how, table) if fills and len(t) and embedded is None else rows
 
 
 def rows_of_frame(frame: Any, how: Reading, sensor: str = DEFAULT_SENSOR) -> DetectionRows:

@@ -63,11 +63,11 @@ class Reading:
         Raises:
             DataError: they stand in a file, which is read elsewhere (`io.tables.class_names`).
         """
-        said = self.class_names
-        if isinstance(said, str) and "," in said:
-            said = [name.strip() for name in said.split(",")]
-        if isinstance(said, str | Path):
+        names = self.class_names
+        if isinstance(names, str) and "," in names:
+            names = [name.strip() for name in names.split(",")]
+        if isinstance(names, str | Path):
             raise DataError(
                 "names of classes are a list or a mapping here; jeat_graph.track reads files of them"
             )
-        return None if said is None else listed_names(said, LISTS_COUNT_FROM)
+        return None if names is None else listed_names(names, LISTS_COUNT_FROM)

@@ -170,15 +170,15 @@ def _feed(path: Path, head: OnnxHead, settings: EmbedderSettings) -> _Feed:
             path,
         )
     height, width = port.shape[1:3] if last else port.shape[2:4]
-    said = (settings.width, settings.height) if settings.width else noted_side(head.notes)
-    if (width is None or height is None) and said is None:
+    declared = (settings.width, settings.height) if settings.width else noted_side(head.notes)
+    if (width is None or height is None) and declared is None:
         raise DataError(
             "leaves the size of its input open, and has no note `imgsz`: say it with --detection-set "
             "embedder.width=… --detection-set embedder.height=…",
             path,
         )
-    side = (width or (said or (0, 0))[0], height or (said or (0, 0))[1])
-    if settings.width and side != said:
+    side = (width or (declared or (0, 0))[0], height or (declared or (0, 0))[1])
+    if settings.width and side != declared:
         raise DataError(
             f"takes {side[0]} x {side[1]} px, not {settings.width} x {settings.height}: leave "
             "embedder.width and embedder.height out",
@@ -196,10 +196,10 @@ def _feed(path: Path, head: OnnxHead, settings: EmbedderSettings) -> _Feed:
 
 def _color(path: Path, notes: Mapping[str, str]) -> bool:
     """Whether the notes say that the colours are red, green, blue, or nothing."""
-    said = notes.get("color", "rgb").strip().lower()
-    if said not in ("rgb", "bgr"):
-        raise DataError(f"has a note `color` that is neither rgb nor bgr: {said!r}", path)
-    return said == "rgb"
+    declared = notes.get("color", "rgb").strip().lower()
+    if declared not in ("rgb", "bgr"):
+        raise DataError(f"has a note `color` that is neither rgb nor bgr: {declared!r}", path)
+    return declared == "rgb"
 
 
 def _noted(path: Path, notes: Mapping[str, str], name: str, usual: FloatArray) -> FloatArray:

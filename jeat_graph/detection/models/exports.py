@@ -46,7 +46,7 @@ class Export(NamedTuple):
         classes: how many classes it names; None where it names none.
         more: numbers behind the class scores of a row; None where nobody knows.
         rtdetr: whether it is Ultralytics' RT-DETR, whose boxes are centres and sizes in shares.
-        task_said: whether the notes say the task.
+        declared_task: whether the notes say the task.
         suppressed: whether the network suppresses by itself; None where the notes do not say it.
         asked: whether the user says the layout: then a file without notes is what it is said to be.
     """
@@ -55,7 +55,7 @@ class Export(NamedTuple):
     classes: int | None
     more: int | None
     rtdetr: bool
-    task_said: bool = False
+    declared_task: bool = False
     suppressed: bool | None = None
     asked: bool = False
 
@@ -65,9 +65,9 @@ class Export(NamedTuple):
         return self.more or 0
 
     @property
-    def said(self) -> str:
+    def description(self) -> str:
         """Say for messages what the notes say; empty where they say nothing."""
-        words = [f"task {self.task}"] if self.task_said else []
+        words = [f"task {self.task}"] if self.declared_task else []
         words += [] if self.classes is None else [f"{self.classes} classes"]
         if self.suppressed is not None:
             words.append("suppression by itself" if self.suppressed else "no suppression by itself")
@@ -100,21 +100,21 @@ def export_of(outputs: Sequence[Port], notes: Mapping[str, str]) -> Export:
     if not task:
         task = POSE if points else SEGMENT if masks else DETECT
     more = {DETECT: 0, TURNED: 1, SEGMENT: masks or _MASK_FACTORS, POSE: points or _PEOPLE_POINTS}[task]
-    said = f"{notes.get('head', '')} {notes.get('description', '')}".lower().replace("-", "")
+    description = f"{notes.get('head', '')} {notes.get('description', '')}".lower().replace("-", "")
     return Export(
         task,
         len(names) or None,
         more,
-        "rtdetr" in said,
-        task_said=bool(notes.get("task", "").strip()),
+        "rtdetr" in description,
+        declared_task=bool(notes.get("task", "").strip()),
         suppressed=_suppressed(notes),
     )
 
 
 def noted_side(notes: Mapping[str, str]) -> tuple[int, int] | None:
     """Return the width and height of the input (px) that the notes say, None where they say none."""
-    said = _literal(notes.get("imgsz", ""))
-    sides = [said, said] if isinstance(said, int) else said
+    size = _literal(notes.get("imgsz", ""))
+    sides = [size, size] if isinstance(size, int) else size
     if not isinstance(sides, list | tuple) or len(sides) != 2:
         return None
     if not all(isinstance(side, int) and 0 < side <= _LARGEST_SIDE for side in sides):

@@ -133,7 +133,7 @@ class ModelSettings(Section):
         return self.width or width, self.height or height
 
     @property
-    def side_said(self) -> bool:
+    def declared_side(self) -> bool:
         """Whether the user says the size of the input."""
         return bool(self.width or self.height)
 

@@ -86,7 +86,7 @@ class OutputReader:
         self._score = settings.least_score(self.layout, own=own)
         names = class_names(notes)
         count = self._channels or (len(names) or None)
-        self._looks, self._looks_without, self.no_numbers = 0, 0, 0
+        self._scans, self._scans_without, self.no_numbers = 0, 0, 0
         known = known_names(names, count if coco else None)
         self._wanted, self.words = wanted_classes(settings.classes, count if names or coco else None, names)
         self._names = None if says_nothing(known, count) else known
@@ -144,15 +144,15 @@ class OutputReader:
         """Say how many boxes were left out because they had no numbers; empty if none were."""
         if not self.no_numbers:
             return ""
-        where = f"in {self._looks_without} of {self._looks} looks"
+        where = f"in {self._scans_without} of {self._scans} looks"
         return f"{self._path}: {self.no_numbers} boxes had no numbers (NaN or infinite), {where}: left out"
 
     def _with_numbers(self, found: DecodedBoxes) -> DecodedBoxes:
         """Leave out the boxes that have no numbers, and count those of a score that is not too low."""
         numbers = np.isfinite(found.corners).all(axis=1) & np.isfinite(found.scores)
         without = int(np.count_nonzero(~numbers & ~(found.scores < self._score)))
-        self._looks += 1
-        self._looks_without += without > 0
+        self._scans += 1
+        self._scans_without += without > 0
         self.no_numbers += without
         if without > _MOST_WITHOUT * len(numbers):
             raise DataError(

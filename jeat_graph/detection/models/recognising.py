@@ -80,8 +80,8 @@ def recognised(path: Path, head: OnnxHead, settings: ModelSettings, run: Run) ->
     open_width, open_height = settings.open_side(noted_side(head.notes))
     side = (width or open_width, height or open_height)
     outputs = given_shapes(head.outputs, lambda: run(inputs.blank(side)))
-    said = settings.side_said or noted_side(head.notes) is not None
-    if outputs != head.outputs and not (width and height) and not said:
+    declared = settings.declared_side or noted_side(head.notes) is not None
+    if outputs != head.outputs and not (width and height) and not declared:
         other = _fixed_side(outputs, side)
         if other is not None and outputs == given_shapes(head.outputs, lambda: run(inputs.blank(other))):
             side = other

@@ -81,9 +81,9 @@ def save_page(page: Any, marks: Path, lengths: Path) -> str:
     emptied = [path for path, there in ((marks, tree), (lengths, table)) if not there and path.is_file()]
     for path in emptied:
         path.unlink()
-    said = [f"Saved {' and '.join(written)}."] if written else []
-    said += [f"Removed {path}: nothing is drawn for it." for path in emptied]
-    return " ".join(said) or "Nothing is drawn: nothing is saved."
+    sentences = [f"Saved {' and '.join(written)}."] if written else []
+    sentences += [f"Removed {path}: nothing is drawn for it." for path in emptied]
+    return " ".join(sentences) or "Nothing is drawn: nothing is saved."
 
 
 def _checked(page: Any) -> Page:

@@ -11,8 +11,8 @@ let marks = { lines: [], zones: [], masks: [], lengths: [] };
 let open = [], dragged = null, scale = 1, mouse = null, ended = false;
 
 function say(text, bad) {
-  get("said").textContent = text;
-  get("said").className = bad ? "bad" : "";
+  get("status").textContent = text;
+  get("status").className = bad ? "bad" : "";
 }
 
 function each(visit) {

@@ -137,13 +137,13 @@ class _Handler(WebHandler):
             return
         try:
             page: Any = json.loads(self.rfile.read(self._length()))
-            said = save_page(page, *self.server.files)
+            reply = save_page(page, *self.server.files)
         except (JeatGraphError, ValueError, RecursionError, OSError) as error:
             self._answer(_TEXT, " ".join(str(error).split()).encode(), HTTPStatus.BAD_REQUEST)
             return
         self.server.page = page
         try:
-            self._answer(_TEXT, said.encode())
+            self._answer(_TEXT, reply.encode())
         finally:  # it is saved, whether or not the browser waited for the answer
             self.server.done = ends[self.path]
 

@@ -38,8 +38,8 @@ class Captions:
         self._parts = parts
         self._classes: _ByTrack = {}
         if table.classes is not None:
-            said = table.classes != ""
-            self._classes = _by_track(table.t[said], table.track_id[said], table.classes[said])
+            labelled = table.classes != ""
+            self._classes = _by_track(table.t[labelled], table.track_id[labelled], table.classes[labelled])
         self._speeds: _ByTrack = {} if speeds is None else _by_track(*speeds)
 
     def of(self, track_id: int, t: float) -> str:
@@ -47,8 +47,8 @@ class Captions:
         texts = []
         if CLASS in self._parts and track_id in self._classes:
             times, names = self._classes[track_id]
-            said = int(np.searchsorted(times, t + _TOLERANCE_S, side="right"))
-            texts += [str(name) for name in names[:said][-1:]]
+            until = int(np.searchsorted(times, t + _TOLERANCE_S, side="right"))
+            texts += [str(name) for name in names[:until][-1:]]
         if NUMBER in self._parts:
             texts.append(f"#{track_id}" if texts else str(track_id))
         caption = " ".join(texts)
@@ -70,19 +70,20 @@ def read_speeds(path: Path) -> tuple[FloatArray, IntArray, FloatArray]:
     """
     from jeat_graph.data.normal import Z95
     from jeat_graph.io.tables.file_tables import read_table
-    from jeat_graph.road.speeds import is_told
+    from jeat_graph.road.speeds import is_reported
 
     table = read_table(path, ("t", "track_id", "speed_kmh", "var_speed_kmh"))
     speed = table.number("speed_kmh", blank_ok=True, nan_ok=True)
     reach = Z95 * np.sqrt(table.number("var_speed_kmh", blank_ok=True, nan_ok=True))
     track = table.whole("track_id")
-    told = np.array([is_told(v, r) for v, r in zip(speed.tolist(), reach.tolist(), strict=True)], dtype=bool)
+    pairs = zip(speed.tolist(), reach.tolist(), strict=True)
+    known = np.array([is_reported(v, r) for v, r in pairs], dtype=bool)
     beside = path.with_name("speeds.csv")
     if path.name == "road.csv" and beside.is_file():
         own = read_table(beside, ("track_id", "speed_kmh"))
         blank = np.isnan(own.number("speed_kmh", blank_ok=True, nan_ok=True))
-        told &= ~np.isin(track, own.whole("track_id")[blank])
-    return table.number("t"), track, np.where(told, speed, np.nan)
+        known &= ~np.isin(track, own.whole("track_id")[blank])
+    return table.number("t"), track, np.where(known, speed, np.nan)
 
 
 def _by_track(t: FloatArray, track_id: IntArray, values: FloatArray | TextArray) -> _ByTrack:

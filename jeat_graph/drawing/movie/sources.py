@@ -365,11 +365,11 @@ def _field(
     warnings = [
         f"{one.name}: {one.size_px[0]} x {one.size_px[1]} px are stretched to the shape of the frames"
         for one in backgrounds[1:]
-        if not _alike(one.size_px, first)
+        if not _same_size(one.size_px, first)
     ]
     if configured is None:
         return first, warnings
-    if _alike(configured, first):
+    if _same_size(configured, first):
         return configured, warnings  # a smaller or larger copy of the same picture
     warnings.append(
         f"the run was made for pictures of {configured[0]:g} x {configured[1]:g} px, but these have "
@@ -378,7 +378,7 @@ def _field(
     return first, warnings
 
 
-def _alike(a: tuple[float, float], b: tuple[float, float]) -> bool:
+def _same_size(a: tuple[float, float], b: tuple[float, float]) -> bool:
     return abs(a[0] * b[1] / (a[1] * b[0]) - 1.0) < _SAME_SHAPE
 
 

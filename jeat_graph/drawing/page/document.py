@@ -15,7 +15,7 @@ from jeat_graph.drawing.page.summary import (
     ERRORS_TITLE,
     count_table,
     link_table,
-    most_telling,
+    most_informative,
     nis_interval,
     score_tables,
     sensor_table,
@@ -156,7 +156,7 @@ def _json(data: RunData, tracks: Sequence[dict[str, Any]]) -> str:
         "start_ms": round(1e3 * data.span_s()[0]),
         "width": data.size_px()[0],
         "nis_bounds": list(nis_interval()),
-        "first": most_telling(data, [one["id"] for one in tracks]),
+        "first": most_informative(data, [one["id"] for one in tracks]),
         "tracks": list(tracks),
     }
     text = json.dumps(content, ensure_ascii=True, separators=(",", ":"), allow_nan=False)

@@ -44,7 +44,7 @@ def _columns(table: Table, names: Sequence[str]) -> Table:
     return Table(tuple(names), rows, table.title, table.digits)
 
 
-def most_telling(data: RunData, among: Sequence[int]) -> int:
+def most_informative(data: RunData, among: Sequence[int]) -> int:
     """Choose the track to be shown first: the one that goes furthest in the picture, not a parked car.
 
     Args:

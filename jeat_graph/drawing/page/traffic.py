@@ -155,7 +155,7 @@ def _speeds(traffic: CountedTraffic) -> str:
         if not len(kmh):
             continue
         value, low, high = v85(kmh)
-        told = len(kmh) >= _LEAST_SPEEDS and math.isfinite(low + high)
+        enough = len(kmh) >= _LEAST_SPEEDS and math.isfinite(low + high)
         records.append(
             {
                 "line": line,
@@ -164,7 +164,7 @@ def _speeds(traffic: CountedTraffic) -> str:
                 "speed known": len(kmh),
                 "mean km/h": float(kmh.mean()),
                 "v85 km/h": value,
-                "its 95 % interval": f"{low:.1f} to {high:.1f}" if told else "too few vehicles",
+                "its 95 % interval": f"{low:.1f} to {high:.1f}" if enough else "too few vehicles",
             }
         )
         drawings.append(_histogram(kmh, value, f"Speeds at {line}, {way} (km/h); dashed: v85"))

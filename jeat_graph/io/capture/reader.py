@@ -171,8 +171,8 @@ class LiveReader(Generic[Item]):
         status = self.status
         if status.ever:
             status.reconnects += 1
-            gone_s = time.monotonic() - status.last
-            self._tell(f"{status.shown}: connected again, after {gone_s:.1f} s")
+            lost_s = time.monotonic() - status.last
+            self._tell(f"{status.shown}: connected again, after {lost_s:.1f} s")
         else:
             self._tell(f"{status.shown}: connected")
         status.connected, status.ever, status.trouble = True, True, ""

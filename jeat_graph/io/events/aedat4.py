@@ -23,7 +23,7 @@ from jeat_graph.io.events.reader import PIECE_ROWS, EventReader, Triggers, agree
 
 MAGIC = b"#!AER-DAT4"
 #: Packets that are looked through for the first frame and the first event.
-_LOOKED_THROUGH = 1000
+_SEARCHED = 1000
 _KINDS = ("events", "frame")
 _NO_LIMIT = 1 << 16
 # Kinds of triggers: 1 a signal rises, 2 it falls, 3 a pulse; 4 and 5 of the generator; a frame begins 6 and
@@ -117,7 +117,7 @@ def packets_of(path: Path) -> Iterator[Any]:
         except StopIteration:
             return
         except BaseException as error:  # the package's own errors, and panics, which are no `Exception`
-            raise _told(error, path) from None
+            raise _as_data_error(error, path) from None
         yield packet
 
 
@@ -133,7 +133,7 @@ def streams_of(path: Path) -> dict[str, tuple[int, int] | None]:
     except (ConfigError, DataError):
         raise
     except BaseException as error:
-        raise _told(error, path) from None
+        raise _as_data_error(error, path) from None
     found: dict[str, tuple[int, int] | None] = {}
     for stream in streams.values():
         size = (int(stream["width"]), int(stream["height"])) if "width" in stream else None
@@ -154,7 +154,7 @@ def origin_us(path: Path) -> int:
             first.setdefault("events", int(packet["events"]["t"][0]))
         if "frame" in packet:
             first.setdefault("frame", int(packet["frame"]["t"]))
-        if first.keys() >= wanted or k >= _LOOKED_THROUGH:
+        if first.keys() >= wanted or k >= _SEARCHED:
             break
     return min(first.values(), default=0)
 
@@ -167,10 +167,10 @@ def _decoder(path: Path) -> Any:
     try:
         return aedat.Decoder(str(path))
     except BaseException as error:
-        raise _told(error, path) from None
+        raise _as_data_error(error, path) from None
 
 
-def _told(error: BaseException, path: Path) -> BaseException:
+def _as_data_error(error: BaseException, path: Path) -> BaseException:
     """Turn an error of the package into one of ours; what asks us to stop stays as it is."""
     if isinstance(error, KeyboardInterrupt | SystemExit | GeneratorExit):
         return error

@@ -25,7 +25,7 @@ import numpy as np
 from jeat_graph.core import events
 from jeat_graph.io.events.words import WordReader
 
-_LOOKED_AT_BYTES = 1 << 16
+_INSPECTED_BYTES = 1 << 16
 _TIME = 8
 _KNOWN_TYPES = (0, 1, _TIME, 10, 14, 15)
 
@@ -47,13 +47,13 @@ class Evt21Reader(WordReader):
     ) -> None:
         if swapped is None:
             begin = file.tell()
-            swapped = _looks_swapped(file.read(_LOOKED_AT_BYTES))
+            swapped = _is_swapped(file.read(_INSPECTED_BYTES))
             file.seek(begin)
         decode = events.decode_evt21_swapped if swapped else events.decode_evt21
         super().__init__(path, file, np.uint64, decode, size_px)
 
 
-def _looks_swapped(data: bytes) -> bool:
+def _is_swapped(data: bytes) -> bool:
     """Whether the types stand in the first half of each word: more of them are known there, or times."""
     halves = np.frombuffer(data[: len(data) // 8 * 8], np.uint32).reshape(-1, 2) >> 28
     known = np.isin(halves, _KNOWN_TYPES).sum(axis=0)

@@ -44,11 +44,11 @@ def events_later_us(t_offset_us: int, origin_us: int, frames: FrameClock | None)
     first_us = round(frames.first_s * _US_PER_S) + origin_frames_us
     if events_us >= _EPOCH_US and first_us >= _EPOCH_US:
         later_us = events_us - origin_frames_us
-        said = ""
+        note = ""
         if later_us and later_us != t_offset_us:
             added = exact_text(later_us / _US_PER_S)
-            said = f"{added} s are added to their times: frames and events count from 1970"
-        return later_us, said
+            note = f"{added} s are added to their times: frames and events count from 1970"
+        return later_us, note
     if t_offset_us >= _EPOCH_US:
         return 0, (
             f"their clock counts from 1970 (time 0 is {exact_text(t_offset_us / _US_PER_S)} s) and that "

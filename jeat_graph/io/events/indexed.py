@@ -26,7 +26,7 @@ _WORD = np.dtype("<u8")
 _VERSIONS = ("0", "1", "2")
 _TIME_BITS = np.uint64(0xFFFFFFFF)
 #: Words that are looked at for a clock that begins again, evenly chosen.
-_LOOKS = 1000
+_SAMPLED = 1000
 
 
 class SearchedFile(EventFile):
@@ -77,10 +77,10 @@ class DatFile:
         self._words: npt.NDArray[np.uint64] = (
             np.memmap(self.path, _WORD, "r", self._header_bytes, (count,)) if count else np.zeros(0, _WORD)
         )
-        looked = self._times(np.linspace(0, max(count - 1, 0), min(count, _LOOKS)).astype(np.int64))
-        if (np.diff(looked) < -(1 << 31)).any():
+        sampled = self._times(np.linspace(0, max(count - 1, 0), min(count, _SAMPLED)).astype(np.int64))
+        if (np.diff(sampled) < -(1 << 31)).any():
             raise DataError("is so long that its clock begins again: convert it to .h5 first", self.path)
-        self.duration_us = int(looked[-1]) + 1 if count else 0
+        self.duration_us = int(sampled[-1]) + 1 if count else 0
 
     def __enter__(self) -> Self:
         return self

@@ -240,5 +240,5 @@ def _divided_unit(t: npt.NDArray[Any], hz_px: dict[str, float]) -> str | None:
     if hz_px["s"] < _LOW_HZ_PX <= hz_px["ms"]:
         return "ms"
     # Of a few ticks of the clock the rate is not known well enough.
-    told = hz_px["s"] <= _HIGH_HZ_PX < hz_px["ms"] and len(np.unique(t)) >= _LEAST_TIMES
-    return "s" if told else None
+    clear = hz_px["s"] <= _HIGH_HZ_PX < hz_px["ms"] and len(np.unique(t)) >= _LEAST_TIMES
+    return "s" if clear else None

@@ -63,11 +63,11 @@ class Stamps(NamedTuple):
     def line(self) -> str:
         """Return it in a line."""
         first, last, own_first, own_last = (value / _US_PER_S for value in self[:4])
-        said = f"stamps of messages: {first:.6f} to {last:.6f} s; first events of these: "
+        text = f"stamps of messages: {first:.6f} to {last:.6f} s; first events of these: "
         if not self.differ:
-            return f"{said}the same clock, {own_first:.6f} to {own_last:.6f} s"
+            return f"{text}the same clock, {own_first:.6f} to {own_last:.6f} s"
         return (
-            f"{said}{own_first:.6f} to {own_last:.6f} s by the camera's own clock; counted from the first "
+            f"{text}{own_first:.6f} to {own_last:.6f} s by the camera's own clock; counted from the first "
             f"one they part by up to {self.apart_us / _US_PER_S:.6f} s (--event-clock header goes by the "
             "stamps)"
         )

@@ -171,8 +171,8 @@ def _reader_of(place: Path, file: BinaryIO, header: RawHeader, size: tuple[int, 
     if header.encoding == "EVT3":
         return Evt3Reader(place, file, size)
     if header.encoding == "EVT21":
-        said = header.options.get("endianness")
-        return Evt21Reader(place, file, size, None if said is None else said == "legacy")
+        endianness = header.options.get("endianness")
+        return Evt21Reader(place, file, size, None if endianness is None else endianness == "legacy")
     if header.encoding is not None:
         raise DataError(
             f"is raw data of the encoding {header.encoding!r}, which is not read; EVT2, EVT2.1 and EVT3 are",

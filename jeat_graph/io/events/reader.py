@@ -115,13 +115,13 @@ class Damage:
 
     def _steps_back(self) -> str:
         """What became of the events after steps back; many of them are damage of its own."""
-        said = f"{self.held:,} events got the latest time before them"
+        note = f"{self.held:,} events got the latest time before them"
         if self.held <= _MOST_HELD * self.events:
-            return said
+            return note
         percent = 100.0 * self.held / self.events
         from_s, late_s = self.held_from_us / _US_PER_S, self.late_us / _US_PER_S
         return (
-            f"{said}; this damage spoils the times of {percent:.1f} % of the events, from {from_s:.6g} s on: "
+            f"{note}; this damage spoils the times of {percent:.1f} % of the events, from {from_s:.6g} s on: "
             f"they are up to {late_s:.6g} s late"
         )
 
@@ -137,9 +137,10 @@ def agreed_size(
     if given is None or own is None:
         return given or own
     if given[0] < own[0] or given[1] < own[1]:
-        said, asked = f"{own[0]} x {own[1]} px", f"{given[0]} x {given[1]} px"
+        recorded, asked = f"{own[0]} x {own[1]} px", f"{given[0]} x {given[1]} px"
         raise DataError(
-            f"says a picture of {said}, but the size given is {asked}, which is smaller; leave it out", path
+            f"says a picture of {recorded}, but the size given is {asked}, which is smaller; leave it out",
+            path,
         )
     return given
 

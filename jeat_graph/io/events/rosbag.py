@@ -126,10 +126,10 @@ class RosbagReader(EventReader):
                 yield whole.take(slice(first, first + PIECE_ROWS))
         stamps = self.stamps
         if stamps is not None and stamps.differ and stamps.apart_us > _DRIFT_US:
-            told = "the stamps" if self._by_header else "the camera, from the first stamp on"
+            clock_source = "the stamps" if self._by_header else "the camera, from the first stamp on"
             self.damage.clock = (
                 "stamps of messages and the camera's clock part by up to "
-                f"{stamps.apart_us / _US_PER_S:.3g} s; times are those of {told}"
+                f"{stamps.apart_us / _US_PER_S:.3g} s; times are those of {clock_source}"
             )
         if edges:
             self.triggers = Triggers.joined(edges)

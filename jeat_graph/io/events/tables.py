@@ -29,7 +29,7 @@ from jeat_graph.io.events.layout import (
 from jeat_graph.io.events.reader import PIECE_ROWS, Damage, EventReader, agreed_size
 
 #: Events of a table that are looked at to tell its columns and unit apart.
-_LOOKED_AT = PIECE_ROWS
+_INSPECTED = PIECE_ROWS
 _US_PER_S = 1_000_000
 _NS_PER_US = 1000
 #: A picture this large is nobody's: an event so far out is damaged (px).
@@ -103,11 +103,11 @@ class TableReader(EventReader):
         self._table = table
         self.damage = table.damage
         self.t_offset_us = table.t_offset_us
-        looked_at = next(table.blocks(), Block((), 0))
-        self._places, named_unit = _places(table.names, looked_at.columns, layout, path)
-        look = slice(0, _LOOKED_AT)
+        head = next(table.blocks(), Block((), 0))
+        self._places, named_unit = _places(table.names, head.columns, layout, path)
+        begin = slice(0, _INSPECTED)
         none = [np.zeros(0)] * (max(self._places.values()) + 1)
-        t, x, y = (np.asarray((looked_at.columns or none)[self._places[r]])[look] for r in "txy")
+        t, x, y = (np.asarray((head.columns or none)[self._places[r]])[begin] for r in "txy")
         self._unit = layout.time_unit or named_unit or _unit(t, x, y, table.likely_unit, path)
         if len(t) and t.dtype.kind == "f" and t.dtype.itemsize < np.dtype(np.float64).itemsize:
             _check_single_precision(t, self._unit, path)
@@ -268,7 +268,7 @@ def _places(
         return places, unit
     if not columns:
         raise DataError("holds no events", path)
-    orders = orders_of([np.asarray(column)[:_LOOKED_AT] for column in columns])
+    orders = orders_of([np.asarray(column)[:_INSPECTED] for column in columns])
     if len(orders) == 1:
         return {role: orders[0].index(role) for role in ROLES}, None
     could = (

@@ -33,8 +33,8 @@ class NumberWriter:
             raise TypeError("cannot be saved: an array of objects")
         flat = _joined(values, dtype)
         shapes = [value.shape for value in values]
-        alike = len(shapes) > 1 and len({shape[1:] for shape in shapes}) == 1 and all(shapes)
-        sizes: Any = [[shape[0] for shape in shapes], shapes[0][1:]] if alike else [shapes]
+        uniform = len(shapes) > 1 and len({shape[1:] for shape in shapes}) == 1 and all(shapes)
+        sizes: Any = [[shape[0] for shape in shapes], shapes[0][1:]] if uniform else [shapes]
         return [self._kinds.setdefault(dtype, len(self._kinds)), sizes, self._parts(flat)]
 
     def kinds(self) -> list[Any]:
@@ -51,14 +51,14 @@ class NumberWriter:
         if words is not None:
             # All words of one place side by side, and all of them judged at once.
             columns = np.ascontiguousarray(flat.view(np.int64).reshape(len(flat), len(words)).T)
-            alike = (columns == columns[:, :1]).all(axis=1).tolist()
+            uniform = (columns == columns[:, :1]).all(axis=1).tolist()
             return [
                 self._part(column[:1] if same else column, kind, len(flat))
-                for column, kind, same in zip(columns, words, alike, strict=True)
+                for column, kind, same in zip(columns, words, uniform, strict=True)
             ]
         if flat.dtype.names:
             raise TypeError("cannot be saved: records of fields that are not of 8 bytes")
-        return self._part(flat[:1] if len(flat) > 1 and _all_alike(flat) else flat, flat.dtype, len(flat))
+        return self._part(flat[:1] if len(flat) > 1 and _all_equal(flat) else flat, flat.dtype, len(flat))
 
     def _part(self, stored: npt.NDArray[Any], kind: np.dtype[Any], count: int) -> list[Any]:
         """Write what is stored of `count` elements of a kind: all of them, or one."""
@@ -100,7 +100,7 @@ def _words(kind: np.dtype[Any]) -> tuple[np.dtype[Any], ...] | None:
     return words if _ALIGN * len(words) == kind.itemsize else None
 
 
-def _all_alike(flat: npt.NDArray[Any]) -> bool:
+def _all_equal(flat: npt.NDArray[Any]) -> bool:
     """Whether all elements (N,) have the same bytes."""
     if flat.dtype.itemsize == _ALIGN:
         bits = flat.view(np.int64)

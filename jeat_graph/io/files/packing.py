@@ -103,8 +103,8 @@ class _Packer:
         (kind,) = kinds
         if kind is np.ndarray:
             dtype = values[0].dtype
-            alike = len(values) == 1 or all(value.dtype == dtype for value in values)
-            return {"array": self.numbers.arrays(values, dtype)} if alike else self._mixed(values)
+            uniform = len(values) == 1 or all(value.dtype == dtype for value in values)
+            return {"array": self.numbers.arrays(values, dtype)} if uniform else self._mixed(values)
         if kind in _LISTS.values():
             return self._lists(values, kind)
         if kind is dict:

@@ -33,9 +33,9 @@ def write_state_file(path: str | Path, text: bytes, block: bytes) -> None:
 
 def digest(text: bytes, block: bytes) -> bytes:
     """Return what changes with any change to either."""
-    told = hashlib.sha256(len(text).to_bytes(8, "little") + text)
-    told.update(block or bytes(1))
-    return told.digest()
+    sha = hashlib.sha256(len(text).to_bytes(8, "little") + text)
+    sha.update(block or bytes(1))
+    return sha.digest()
 
 
 def read_state_file(path: str | Path, what: str) -> tuple[bytes, bytes]:

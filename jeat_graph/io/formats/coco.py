@@ -125,8 +125,8 @@ def _placed(
     kind, of_entry = np.unique(found.category, return_inverse=True)
     words = np.array([names.get(number, str(number)) for number in kind.tolist()], dtype=np.str_)
     classes = words[of_entry.reshape(-1)]
-    said = names_by_number(how.class_names, path, _FIRST_CATEGORY)
-    named = name_classes(classes, None if names and how.class_names is None else said)
+    given_names = names_by_number(how.class_names, path, _FIRST_CATEGORY)
+    named = name_classes(classes, None if names and how.class_names is None else given_names)
     return CocoBoxes(
         t=np.asarray(t)[kept],
         boxes=found.boxes[kept],
@@ -194,7 +194,7 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
 def _recognise(head: FileHead) -> Certainty:
     if head.suffix == _SUFFIX:
         return Certainty.NAMED
-    return Certainty.LOOKS if head.text[:1] in ("[", "{") else Certainty.NONE
+    return Certainty.BY_CONTENT if head.text[:1] in ("[", "{") else Certainty.NONE
 
 
 def _counts_frames(path: str | Path) -> bool:

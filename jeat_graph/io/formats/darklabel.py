@@ -32,7 +32,7 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
         DataError: names the line and what is wrong; or no rate is given.
     """
     text = read_text(path).decode("utf-8", errors="replace")
-    lines, looked, frames, rows, labels = [], [], [], [], []
+    lines, labelled, frames, rows, labels = [], [], [], [], []
     width: int | None = None
     for number, line in enumerate(re.split(r"\r\n|\n|\r", text), 1):
         if not line.strip():
@@ -40,7 +40,7 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
         fields = _fields(line)
         width = width or _width(fields)
         frame = _checked(fields, width, path, number)
-        looked.append(frame)
+        labelled.append(frame)
         step = width or _WITH_ID
         for start in range(_BEFORE_BOXES, len(fields), step):
             box = fields[start : start + step]
@@ -50,7 +50,7 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
             lines.append(number)
     if how.rate_hz is None:
         raise DataError("has frame numbers only; give their rate with --rate (in Python rate_hz)", path)
-    rate, numbers = check_rate(how.rate_hz, path), np.array(looked, dtype=np.int64)
+    rate, numbers = check_rate(how.rate_hz, path), np.array(labelled, dtype=np.int64)
     first = first_frame(numbers, how.first_frame)
     if len(numbers) and numbers.min() < first:
         raise DataError(f"frames count from {first}, got {numbers.min()}", path)
@@ -125,7 +125,7 @@ def _recognise(head: FileHead) -> Certainty:
     if not any(widths) or not all(width or none for width, none in zip(widths, empty, strict=True)):
         return Certainty.NONE
     named = any(not is_number(fields[-1]) for fields, width in zip(found, widths, strict=True) if width)
-    return Certainty.LOOKS_EXACTLY if named else Certainty.NONE
+    return Certainty.BY_EXACT_CONTENT if named else Certainty.NONE
 
 
 FORMAT = BoxFormat(

@@ -51,7 +51,7 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
     rows = _load(path)
     table = _table(rows, Path(path))
     if how.rate_hz is None:
-        how = replace(how, rate_hz=_rate_said(rows))
+        how = replace(how, rate_hz=_declared_rate(rows))
     table = of_one_video(table, how)
     times = times_of(table, how)
     scores = table.number("score", blank_ok=True) if "score" in table else np.full(len(table), np.nan)
@@ -115,11 +115,11 @@ def _arrow(values: list[Any]) -> Any:
     return pa.chunked_array([column])
 
 
-def _rate_said(rows: list[dict[str, Any]]) -> float | None:
+def _declared_rate(rows: list[dict[str, Any]]) -> float | None:
     """Frames per second (Hz) that all objects say alike; None where they do not."""
     for key in _RATES:
-        said = {row.get(key) for row in rows if isinstance(row.get(key), int | float)}
-        if len(said) == 1 and (rate_hz := float(next(iter(said)) or 0.0)) > 0.0:
+        rates = {row.get(key) for row in rows if isinstance(row.get(key), int | float)}
+        if len(rates) == 1 and (rate_hz := float(next(iter(rates)) or 0.0)) > 0.0:
             return rate_hz
     return None
 

@@ -132,7 +132,7 @@ def _recognise(head: FileHead) -> Certainty:
     """A first line of as many words as a label has, of which the third is no number."""
     words = head.line.split()
     looks = len(words) >= len(_LABEL) and "," not in head.line and not is_number(words[2])
-    return Certainty.LOOKS if looks else Certainty.NONE
+    return Certainty.BY_CONTENT if looks else Certainty.NONE
 
 
 FORMAT = BoxFormat(

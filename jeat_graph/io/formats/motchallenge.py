@@ -77,13 +77,13 @@ def boxes_of(table: FileTable) -> FloatArray:
 
 
 def class_names(
-    table: FileTable, said: ClassNames | None = None, challenge: bool = False
+    table: FileTable, given: ClassNames | None = None, challenge: bool = False
 ) -> np.typing.NDArray[np.str_] | None:
     """Return the class of each line (R,), or None without one.
 
     Args:
         table: the file's table.
-        said: names of classes that the user gives.
+        given: names of classes that the user gives.
         challenge: whether the numbers are those of the challenge where nobody says their names: so it is in
             its truth, while detectors and trackers write numbers of their own.
 
@@ -98,7 +98,7 @@ def class_names(
         return np.zeros(0, dtype=np.str_) if not len(table) else None
     distinct, index = np.unique(table.whole(column), return_inverse=True)
     texts = np.array(["" if number < 0 else str(number) for number in distinct], dtype=np.str_)
-    names = names_by_number(said, table.path, _FIRST_CLASS)
+    names = names_by_number(given, table.path, _FIRST_CLASS)
     if names is None and table.path is not None:
         names = _names_in_zip(table.path)
     if names is None and challenge:
@@ -240,7 +240,7 @@ def _recognise(head: FileHead) -> Certainty:
     if read_member(head.path, MEMBER) is not None:
         return Certainty.SAYS
     numbers = len(head.fields) >= min(_COLUMNS) and all(map(is_number, head.fields))
-    return Certainty.LOOKS if numbers or head.blank else Certainty.NONE
+    return Certainty.BY_CONTENT if numbers or head.blank else Certainty.NONE
 
 
 FORMAT = BoxFormat(

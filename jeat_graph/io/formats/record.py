@@ -90,9 +90,9 @@ class Certainty(IntEnum):
     #: Nothing speaks against it: what no other format takes.
     POSSIBLE = 1
     #: Its content looks so.
-    LOOKS = 2
+    BY_CONTENT = 2
     #: Its content looks so, and files of another format that look alike too do not.
-    LOOKS_EXACTLY = 3
+    BY_EXACT_CONTENT = 3
     #: Its name ends so.
     NAMED = 4
     #: Its bytes say so, whatever its name.

@@ -52,7 +52,7 @@ def read_boxes(path: str | Path, how: Reading, truth: bool = False) -> FileBoxes
 
 def _recognise(head: FileHead) -> Certainty:
     numbers = len(head.fields) == _COLUMNS and all(map(is_number, head.fields))
-    return Certainty.LOOKS_EXACTLY if numbers and _NAME.fullmatch(head.path.name) else Certainty.NONE
+    return Certainty.BY_EXACT_CONTENT if numbers and _NAME.fullmatch(head.path.name) else Certainty.NONE
 
 
 FORMAT = BoxFormat(

@@ -45,7 +45,7 @@ class Labels:
         boxes: (R, 4) left, top, width, height (px).
         scores: (R,) confidence, or None.
         ids: (R,) identity, or None.
-        looked: (T,) frames that have a file, ascending.
+        labelled: (T,) frames that have a file, ascending.
         place: file and line of each row.
     """
 
@@ -54,7 +54,7 @@ class Labels:
     boxes: FloatArray
     scores: FloatArray | None
     ids: IntArray | None
-    looked: IntArray
+    labelled: IntArray
     place: list[tuple[Path, int]]
 
     def error(self, row: int, message: str) -> DataError:
@@ -97,9 +97,9 @@ def read_labels(path: str | Path, how: Reading) -> Labels:
             rows.append(_numbers(fields, file, line, rows))
             place.append((file, line))
             frames.append(number)
-    looked = np.array([number for number, _ in files], dtype=np.int64)
-    if len(np.unique(looked)) < len(looked):
-        twice = int(looked[:-1][np.diff(looked) == 0][0])
+    labelled = np.array([number for number, _ in files], dtype=np.int64)
+    if len(np.unique(labelled)) < len(labelled):
+        twice = int(labelled[:-1][np.diff(labelled) == 0][0])
         raise DataError(f"has two files of frame {twice}", folder)
     found = np.array(rows, dtype=np.float64) if rows else np.zeros((0, _FEWEST))
     scores, ids = _score_and_track(found)
@@ -107,7 +107,7 @@ def read_labels(path: str | Path, how: Reading) -> Labels:
     boxes = found[:, 1:5] * size
     boxes[:, :2] -= boxes[:, 2:] / 2
     labels = Labels(
-        np.array(frames, dtype=np.int64), found[:, 0].astype(np.int64), boxes, scores, ids, looked, place
+        np.array(frames, dtype=np.int64), found[:, 0].astype(np.int64), boxes, scores, ids, labelled, place
     )
     return labels
 
@@ -175,23 +175,23 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
         DataError: as `read_labels`; or no rate is given.
     """
     labels = read_labels(path, how)
-    first = first_frame(labels.looked, how.first_frame)
+    first = first_frame(labels.labelled, how.first_frame)
     if how.rate_hz is None:
         raise DataError("has frame numbers only; give their rate with --rate (in Python rate_hz)", path)
     rate = check_rate(how.rate_hz, path)
-    if len(labels.looked) and labels.looked[0] < first:
-        raise DataError(f"frames count from {first}, got {labels.looked[0]}", path)
+    if len(labels.labelled) and labels.labelled[0] < first:
+        raise DataError(f"frames count from {first}, got {labels.labelled[0]}", path)
     return FileBoxes(
         t=(labels.frame - first) / rate,
         boxes=labels.boxes,
         error=labels.error,
-        recorded=lambda: (fill_frames(labels.looked, path) - first) / rate,
+        recorded=lambda: (fill_frames(labels.labelled, path) - first) / rate,
         scores=labels.scores,
         ids=labels.ids,
         classes=name_classes(
             labels.kind.astype(np.str_), names_by_number(how.class_names, path, LISTS_COUNT_FROM)
         ),
-        frames=FrameCount.of(labels.looked, first),
+        frames=FrameCount.of(labels.labelled, first),
     )
 
 
@@ -210,7 +210,7 @@ def _is_label(fields: Sequence[str]) -> bool:
 
 def _recognise(head: FileHead) -> Certainty:
     """The labels of one picture, which reading refuses: a folder is recognised as one."""
-    return Certainty.LOOKS_EXACTLY if _is_label(head.fields) else Certainty.NONE
+    return Certainty.BY_EXACT_CONTENT if _is_label(head.fields) else Certainty.NONE
 
 
 FORMAT = BoxFormat(

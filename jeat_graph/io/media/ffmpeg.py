@@ -72,7 +72,7 @@ class FfmpegVideo:
     ) -> None:
         program, name = encoder
         self._shown = shown
-        self._said = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
+        self._messages = stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115
         command = [program, "-hide_banner", "-loglevel", "error", "-nostdin", "-y"]
         command += ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size_px[0]}x{size_px[1]}"]
         command += ["-r", f"{rate_hz:.6f}", "-i", "pipe:0", "-an", "-c:v", name, *_ENCODERS[name]]
@@ -80,7 +80,7 @@ class FfmpegVideo:
         command += ["-flags:v", "+bitexact", "-map_metadata", "-1", "-f", "mp4", str(path.absolute())]
         try:
             self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._said
+                command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=self._messages
             )
         except OSError as error:
             raise DataError(
@@ -116,8 +116,8 @@ class FfmpegVideo:
 
     def _failed(self) -> DataError:
         self._end()
-        self._said.seek(0)
-        lines = self._said.read().decode("utf-8", errors="replace").strip().splitlines() or ["it ended"]
+        self._messages.seek(0)
+        lines = self._messages.read().decode("utf-8", errors="replace").strip().splitlines() or ["it ended"]
         return DataError(f"cannot be written by FFmpeg: {lines[-1][:200]}", self._shown)
 
     def _end(self) -> None:

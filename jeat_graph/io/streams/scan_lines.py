@@ -174,8 +174,8 @@ def _scan_of(item: Any, how: StreamReading) -> tuple[Scan, int] | None:
     boxes, scores = item["boxes"], item.get("scores")
     if scores is None:
         scores = np.ones(len(boxes) if hasattr(boxes, "__len__") else 0)
-    looks = _with_blanks(item.get(_EMBEDDINGS))
-    return how.scan(t, sensor, boxes, scores, _classes_of(item), looks, item.get(CAMERA_MOTION))
+    vectors = _with_blanks(item.get(_EMBEDDINGS))
+    return how.scan(t, sensor, boxes, scores, _classes_of(item), vectors, item.get(CAMERA_MOTION))
 
 
 def _classes_of(item: dict[Any, Any]) -> dict[str, TextArray]:

@@ -43,7 +43,7 @@ class _Row(NamedTuple):
     box: list[float] | None
     score: float
     kinds: dict[str, str]
-    look: list[float] | None
+    embedding: list[float] | None
     motion: list[float] | None
     flat: int
 
@@ -81,11 +81,11 @@ def csv_columns(header: str, name: str, at: int) -> CsvForm:
     if missing:
         what = f"column {missing[0]} is missing"
         raise DataError(f"the first line must be a scan as JSON or a header of CSV; {what}", name, at)
-    told = [column for column in columns if column.startswith("sensor.")]
-    if told:
+    declared = [column for column in columns if column.startswith("sensor.")]
+    if declared:
         note(
-            f"{', '.join(told)}: a stream's tracker is made before its first row: this is not read; say it "
-            "with --set sensors.NAME.… or --detector-frames and its like"
+            f"{', '.join(declared)}: a stream's tracker is made before its first row: this is not read; give "
+            "it with --set sensors.NAME.… or --detector-frames and its like"
         )
     known = [column for column in (*needed, "sensor", *_OPTIONAL) if column in columns]
     return CsvForm({column: columns.index(column) for column in known}, time, sides, mark)
@@ -123,7 +123,7 @@ def csv_batches(
 
 def _scan_that_fits(rows: list[_Row], first: int, name: str, how: StreamReading) -> ScanBatch:
     """Make the scan of rows that are good each by itself; errors name the line of the first."""
-    lengths = sorted({len(row.look) for row in rows if row.look is not None})
+    lengths = sorted({len(row.embedding) for row in rows if row.embedding is not None})
     if len(lengths) > 1:
         what = f"embeddings of one scan must have equally many numbers, not {lengths[0]} and {lengths[1]}"
         raise DataError(what, name, first)
@@ -171,10 +171,10 @@ def _row_of(value: dict[str, str], form: CsvForm, how: StreamReading) -> _Row | 
         score = _number("score", value["score"], comma) if "score" in value else score
         box = _box_of(value, form, comma)
     words = value.get("embedding", "").split()
-    look = [_number("embedding", word, comma) for word in words] if words and box is not None else None
+    embedding = [_number("embedding", word, comma) for word in words] if words and box is not None else None
     motion = [_number(CAMERA_MOTION, word, comma) for word in value.get(CAMERA_MOTION, "").split()] or None
     kinds = {name: value[name] for name in CLASS_COLUMNS if name in value}
-    return _Row(t, sensor, box, score, kinds, look, motion, 0)
+    return _Row(t, sensor, box, score, kinds, embedding, motion, 0)
 
 
 def _box_of(value: dict[str, str], form: CsvForm, comma: bool) -> list[float]:
@@ -203,8 +203,10 @@ def _scan_of_rows(rows: list[_Row], line: int, how: StreamReading) -> ScanBatch:
     kinds: dict[str, TextArray] = {
         column: np.array([row.kinds[column] for row in found], dtype=np.str_) for column in rows[0].kinds
     }
-    numbers = next((len(row.look) for row in found if row.look is not None), 0)
-    looks = [[np.nan] * numbers if row.look is None else row.look for row in found] if numbers else None
+    numbers = next((len(row.embedding) for row in found if row.embedding is not None), 0)
+    embeddings = (
+        [[np.nan] * numbers if row.embedding is None else row.embedding for row in found] if numbers else None
+    )
     motion = next((row.motion for row in rows if row.motion is not None), None)
-    scan, flat = how.scan(rows[0].t, rows[0].sensor, boxes, scores, kinds, looks, motion)
+    scan, flat = how.scan(rows[0].t, rows[0].sensor, boxes, scores, kinds, embeddings, motion)
     return ScanBatch([scan], [line], flat + sum(row.flat for row in rows))

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import TextArray
-from jeat_graph.data.class_columns import LISTS_COUNT_FROM, name_classes, naming_hint, said_classes
+from jeat_graph.data.class_columns import LISTS_COUNT_FROM, declared_classes, name_classes, naming_hint
 from jeat_graph.data.column_names import FRAME_COLUMNS, TIME_COLUMNS
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_numbers import first_frame, split_picture_name
@@ -54,7 +54,7 @@ class StreamReading:
         self._goes_on = goes_on
         self._first: int | None = None
         self._video: str | None = None
-        self._told_of_video = False
+        self._warned_of_video = False
         self._found: set[str] = set()  # classes that came, as long as none of those asked for has
         self._names = names_by_number(self.how.class_names, None, LISTS_COUNT_FROM)
         self._rate_hz = None if self.how.rate_hz is None else check_rate(self.how.rate_hz, "--rate")
@@ -92,9 +92,9 @@ class StreamReading:
         """
         if self.how.video is not None:
             other = name != str(self.how.video)
-            if other and not self._told_of_video:
+            if other and not self._warned_of_video:
                 note(f"what is of video {name!r}, or another than {self.how.video}, is passed over")
-            self._told_of_video = self._told_of_video or other
+            self._warned_of_video = self._warned_of_video or other
             return not other
         if self._video is None:
             self._video = name
@@ -110,7 +110,7 @@ class StreamReading:
         sensor: str,
         boxes: npt.ArrayLike,
         scores: npt.ArrayLike,
-        said: Mapping[str, TextArray],
+        columns: Mapping[str, TextArray],
         embeddings: npt.ArrayLike | None = None,
         camera_motion: npt.ArrayLike | None = None,
     ) -> tuple[Scan, int]:
@@ -121,7 +121,7 @@ class StreamReading:
             sensor: its name.
             boxes: (M, 4) left, top, width, height (px).
             scores: (M,) on the scale of `how`.
-            said: (M,) classes by the name of their column, of `class_columns.CLASS_COLUMNS`.
+            columns: (M,) classes by the name of their column, of `class_columns.CLASS_COLUMNS`.
             embeddings: (M, E), or None.
             camera_motion: (11,), or None.
 
@@ -131,7 +131,7 @@ class StreamReading:
         Raises:
             DataError: as `Scan`.
         """
-        classes = name_classes(said_classes(said), self._names)
+        classes = name_classes(declared_classes(columns), self._names)
         if self.how.score_scale != "unit":
             scores = scale_scores(np.asarray(scores, dtype=np.float64), self.how.score_scale, "")
         try:
@@ -162,13 +162,13 @@ class StreamReading:
         came = set(scan.classes.tolist())
         self._found |= came if len(self._found) < _MOST_NAMED else came & set(self._classes)
         keep = np.isin(scan.classes, [*self._classes, ""])
-        looks = None if scan.embeddings is None else scan.embeddings[keep]
+        vectors = None if scan.embeddings is None else scan.embeddings[keep]
         return replace(
             scan,
             boxes=scan.boxes[keep],
             scores=scan.scores[keep],
             classes=scan.classes[keep],
-            embeddings=looks,
+            embeddings=vectors,
         )
 
     def _time_of_text(self, column: str, text: str) -> float:

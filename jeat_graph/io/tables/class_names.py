@@ -25,27 +25,27 @@ _YAML = (".yaml", ".yml")
 _LARGEST = 1 << 20
 
 
-def names_by_number(said: ClassNames | None, beside: str | Path | None, first: int) -> dict[int, str] | None:
+def names_by_number(given: ClassNames | None, beside: str | Path | None, first: int) -> dict[int, str] | None:
     """Return the names of classes by number; None where nobody says them.
 
     Args:
-        said: what the user gives: names in order, by number, or a file of them.
-        beside: the file with the numbers, if there is one; without `said` a list is looked for in its folder.
+        given: what the user gives: names in order, by number, or a file of them.
+        beside: the file with the numbers, if there is one; without `given` its folder is searched for a list.
         first: number of the first name of a list.
 
     Raises:
         DataError: a list that cannot be read.
     """
-    if said is not None and not isinstance(said, str | Path):
-        return listed_names(said, first)
-    if said is None:
-        said = None if beside is None else _list_beside(Path(beside))
-        return None if said is None else _read(Path(said), first)
-    if os.path.exists(said):  # unlike Path's, it takes any text, however long
-        return _read(Path(said), first)
-    if "," in str(said):
-        return dict(enumerate((name.strip() for name in str(said).split(",")), first))
-    raise DataError("no such file; names of classes themselves have commas between them: car,truck", said)
+    if given is not None and not isinstance(given, str | Path):
+        return listed_names(given, first)
+    if given is None:
+        given = None if beside is None else _list_beside(Path(beside))
+        return None if given is None else _read(Path(given), first)
+    if os.path.exists(given):  # unlike Path's, it takes any text, however long
+        return _read(Path(given), first)
+    if "," in str(given):
+        return dict(enumerate((name.strip() for name in str(given).split(",")), first))
+    raise DataError("no such file; names of classes themselves have commas between them: car,truck", given)
 
 
 def _list_beside(path: Path) -> Path | None:

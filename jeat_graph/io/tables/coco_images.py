@@ -113,8 +113,8 @@ def _frame_number(image: Mapping[str, Any], named: Mapping[int, int]) -> float:
     Raises:
         TypeError, ValueError, OverflowError: what it says is no finite number.
     """
-    said = next((image[key] for key in _FRAME_KEYS if key in image), None)
-    return finite_number(named.get(image["id"], image["id"]) if said is None else said)
+    declared = next((image[key] for key in _FRAME_KEYS if key in image), None)
+    return finite_number(named.get(image["id"], image["id"]) if declared is None else declared)
 
 
 def _numbers_in_names(images: list[dict[str, Any]]) -> dict[int, int]:
@@ -126,10 +126,10 @@ def _numbers_in_names(images: list[dict[str, Any]]) -> dict[int, int]:
     parts = {image["id"]: split_picture_name(str(image.get("file_name", ""))) for image in images}
     found = {number: part for number, part in parts.items() if part is not None}
     numbers = [part[1] for part in found.values()]
-    alike = len({part[0] for part in found.values()}) == 1
+    same_size = len({part[0] for part in found.values()}) == 1
     whole = len(found) == len(images) and len(set(numbers)) == len(numbers)
-    said = any(key in image for image in images for key in ("timestamp", *_FRAME_KEYS))
-    return {number: part[1] for number, part in found.items()} if alike and whole and not said else {}
+    declared = any(key in image for image in images for key in ("timestamp", *_FRAME_KEYS))
+    return {number: part[1] for number, part in found.items()} if same_size and whole and not declared else {}
 
 
 def _times(

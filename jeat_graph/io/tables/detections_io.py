@@ -136,8 +136,8 @@ def read_many_counted(paths: Sequence[str | Path], **options: Any) -> tuple[Dete
     Their first frame is that of the first file that counts frames, `fixed` unless it was a guess that there
     is no frame 0.
     """
-    said = options.get("first_frame")
-    parts, decided = read_together(detection_readers(paths, **options), said)
+    declared = options.get("first_frame")
+    parts, decided = read_together(detection_readers(paths, **options), declared)
     whole = parts[0] if len(parts) == 1 else Detections.concatenate(parts)
     counts = [one for one in decided if one is not None]
     if not counts:
@@ -147,7 +147,7 @@ def read_many_counted(paths: Sequence[str | Path], **options: Any) -> tuple[Dete
         min(one.lowest for one in counts),
         max(one.highest for one in counts),
     )
-    return whole, FrameCount(first, lowest, highest, fixed=first == 0 or said is not None)
+    return whole, FrameCount(first, lowest, highest, fixed=first == 0 or declared is not None)
 
 
 def detection_readers(paths: Sequence[str | Path], **options: Any) -> list[Reader[Detections]]:
@@ -213,7 +213,7 @@ def write_detections(
     detections: Detections,
     path: str | Path,
     decimals: int | None = None,
-    said: Mapping[str, Mapping[str, Any]] | None = None,
+    declared: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write detections as CSV, or as Parquet where the name ends so; empty scans are rows without a box.
 
@@ -221,12 +221,12 @@ def write_detections(
         detections: what to write.
         path: the file; it appears only when it is complete.
         decimals: decimals (px) to which boxes are rounded; by default every number is kept to the last bit.
-        said: what is known of the detector of each sensor, by the keys of `sensors.NAME`; `track` reads it
-            back (`sensor_columns`).
+        declared: what is known of the detector of each sensor, by the keys of `sensors.NAME`; `track` reads
+            it back (`sensor_columns`).
     """
     columns = detections.columns()
-    if said:
-        columns |= columns_of(said, columns["sensor"])
+    if declared:
+        columns |= columns_of(declared, columns["sensor"])
     if decimals is not None:
         columns |= {name: round_decimals(columns[name], decimals) for name in BOX}
     write_columns(columns, path)

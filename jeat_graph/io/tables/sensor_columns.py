@@ -36,26 +36,26 @@ PREFIX = "sensor."
 _SENSOR = "sensor"
 
 #: Settings by sensor and key, as `sensors` of a configuration has them.
-Said = dict[str, dict[str, Any]]
+Declared = dict[str, dict[str, Any]]
 
 
-def columns_of(said: Mapping[str, Mapping[str, Any]], sensor: TextArray) -> dict[str, npt.NDArray[Any]]:
+def columns_of(declared: Mapping[str, Mapping[str, Any]], sensor: TextArray) -> dict[str, npt.NDArray[Any]]:
     """Return the columns (R,) that say of each row's sensor what is known, by name.
 
     Args:
-        said: settings by sensor and key; a key that no sensor has makes no column.
+        declared: settings by sensor and key; a key that no sensor has makes no column.
         sensor: (R,) name of the sensor of each row.
     """
     names, code = np.unique(sensor, return_inverse=True)
-    keys = sorted({key for name in names.tolist() for key in said.get(name, {})})
+    keys = sorted({key for name in names.tolist() for key in declared.get(name, {})})
     columns = {}
     for key in keys:
-        texts = [_text_of(said.get(name, {}).get(key)) for name in names.tolist()]
+        texts = [_text_of(declared.get(name, {}).get(key)) for name in names.tolist()]
         columns[PREFIX + key] = np.array(texts, dtype=np.str_)[code]
     return columns
 
 
-def said_by(path: str | Path, sensor: str | None = None) -> Said:
+def declared_by(path: str | Path, sensor: str | None = None) -> Declared:
     """Return what a file of detections says of its detectors; nothing where it is no table with such columns.
 
     Args:
@@ -73,24 +73,24 @@ def said_by(path: str | Path, sensor: str | None = None) -> Said:
         return {}
     kinds = dict.fromkeys((_SENSOR, *wanted), WORD)
     table = read_table(path, (), (_SENSOR, *wanted), aliases=True, kinds=kinds)
-    return said_in(table, sensor)
+    return declared_in(table, sensor)
 
 
-def said_by_frame(frame: Any) -> Said:
-    """Return what a data frame says; errors as of `said_by`."""
+def declared_by_frame(frame: Any) -> Declared:
+    """Return what a data frame says; errors as of `declared_by`."""
     frame = collected(frame)
     wanted = [str(name) for name in frame.columns if str(name).startswith(PREFIX)]
-    return said_in(table_of_frame(frame, (), (_SENSOR, *wanted), "detections")) if wanted else {}
+    return declared_in(table_of_frame(frame, (), (_SENSOR, *wanted), "detections")) if wanted else {}
 
 
-def said_in(table: FileTable, sensor: str | None = None) -> Said:
-    """Return what a table's columns `sensor.KEY` say; args and errors as of `said_by`."""
+def declared_in(table: FileTable, sensor: str | None = None) -> Declared:
+    """Return what a table's columns `sensor.KEY` say; args and errors as of `declared_by`."""
     wanted = [name for name in table.names if name.startswith(PREFIX)]
     if _SENSOR in table and sensor is None:
         names, code = table.words(_SENSOR, blank_ok=True)
     else:
         names, code = [sensor or DEFAULT_SENSOR], np.zeros(len(table), dtype=np.int64)
-    said: Said = {}
+    declared: Declared = {}
     for column in wanted:
         texts, index = table.words(column, blank_ok=True)
         pairs, first = np.unique(np.column_stack([code, index]), axis=0, return_index=True)
@@ -98,7 +98,7 @@ def said_in(table: FileTable, sensor: str | None = None) -> Said:
             text = texts[value] if texts else ""
             if not text:
                 continue
-            known = said.setdefault(names[one], {})
+            known = declared.setdefault(names[one], {})
             key = column.removeprefix(PREFIX)
             checked = _checked(key, text, table, row)
             if key in known:
@@ -106,21 +106,21 @@ def said_in(table: FileTable, sensor: str | None = None) -> Said:
                     row, f"{column} of sensor {names[one]!r} is {text}, and {known[key]} in a row before"
                 )
             known[key] = checked
-    return said
+    return declared
 
 
-def said_by_all(items: Iterable[tuple[str | None, str | Path]]) -> Said:
+def declared_by_all(items: Iterable[tuple[str | None, str | Path]]) -> Declared:
     """Return what several files of one scene say.
 
     Args:
         items: the name that a file's one sensor is given, or None, and the file.
 
     Raises:
-        DataError: as `said_by`; or two files say different things of one sensor.
+        DataError: as `declared_by`; or two files say different things of one sensor.
     """
-    found: Said = {}
+    found: Declared = {}
     for name, path in items:
-        for sensor, keys in said_by(path, name).items():
+        for sensor, keys in declared_by(path, name).items():
             known = found.setdefault(sensor, {})
             for key, value in keys.items():
                 if known.setdefault(key, value) != value:
@@ -131,11 +131,11 @@ def said_by_all(items: Iterable[tuple[str | None, str | Path]]) -> Said:
     return found
 
 
-def as_settings(said: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def as_settings(declared: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return the same as `key=value` texts of the tracker's configuration."""
     return [
         f'sensors."{sensor}".{key}={json.dumps(value)}'
-        for sensor, keys in sorted(said.items())
+        for sensor, keys in sorted(declared.items())
         for key, value in sorted(keys.items())
     ]
 

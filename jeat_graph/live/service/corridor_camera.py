@@ -84,7 +84,7 @@ def _passage(one: LinePassage) -> LivePassage:
     )
 
 
-def _told(error: Exception) -> str:
+def _words(error: Exception) -> str:
     """What is said of an error; of a fault of the program its kind, too."""
     known = isinstance(error, (JeatGraphError, OSError))
     return str(error) if known else f"{type(error).__name__}: {error}"
@@ -161,7 +161,7 @@ class CorridorCamera:
                 if time.monotonic() - begun > _WELL_S:
                     back_off.succeeded()
                 pause_s = back_off.failed()
-                self._trouble = _told(error)
+                self._trouble = _words(error)
                 self._log.write(ERROR, f"ends: {self._trouble}; begins again in {pause_s:g} s")
                 service = self._new()
                 until = time.monotonic() + pause_s

@@ -28,8 +28,8 @@ from jeat_graph.live.service.status import RUNNING, STOPPING, Status
 from jeat_graph.live.service.systemd import Watchdog, notify
 from jeat_graph.live.service.web import Web
 from jeat_graph.live.session import MESSAGE_ERRORS, Ends, Session, of_message
+from jeat_graph.live.session_warnings import BadLines
 from jeat_graph.live.smoothed_file import SmoothedFile, has_rows
-from jeat_graph.live.told import BadLines
 from jeat_graph.live.transport.patience import UnconfirmedError
 from jeat_graph.tracking.tracker import Tracker
 
@@ -142,15 +142,15 @@ class Service:
         self._saved_tracker(None)
 
     def _stopped(self) -> bool:
-        self._look_around()
+        self._watch()
         return self._interrupts.seen is not None
 
     def _overdue(self) -> bool:
         """Asked by brokers in each slice of a wait, so that a long wait is no sign of death."""
-        self._look_around()
+        self._watch()
         return self._interrupts.overdue()
 
-    def _look_around(self) -> None:
+    def _watch(self) -> None:
         """Be alive, and say which sensors have fallen silent by the clock on the wall, be it all of them."""
         self.status.alive()
         for name, silent_s in self.status.changes_of_silence():

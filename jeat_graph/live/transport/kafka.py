@@ -17,7 +17,7 @@ from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedErro
 MOST_OPEN = 4096
 _CONNECT_S = 10.0
 #: Pauses between looks for a broker that does not answer, and longest wait for one (s).
-_LOOK_S, _ASK_S = 5.0, 0.5
+_CHECK_S, _ASK_S = 5.0, 0.5
 #: Errors that do not pass by themselves.
 _FOR_GOOD = (KafkaError.TOPIC_AUTHORIZATION_FAILED, KafkaError.GROUP_AUTHORIZATION_FAILED)
 #: How soon the group takes a member for dead that does not answer (ms): a restart should not wait longer.
@@ -78,7 +78,7 @@ class KafkaSource:
         self.most_open = MOST_OPEN
         self.address = address
         self._notices = notices or Notices()
-        self._look_at = 0.0
+        self._check_at = 0.0
         self._next: dict[tuple[str, int], int] = {}
         self._group = address.option("group", f"jeat-graph.{address.topic}")
         self._consumer = Consumer(
@@ -114,8 +114,8 @@ class KafkaSource:
 
     def _on_revoke(self, consumer: Any, partitions: list[TopicPartition]) -> None:
         # What comes to another member now is not ours to acknowledge: to try would fail for the rest, too.
-        for gone in partitions:
-            self._next.pop((gone.topic, gone.partition), None)
+        for lost in partitions:
+            self._next.pop((lost.topic, lost.partition), None)
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Wait for the next message.
@@ -128,7 +128,7 @@ class KafkaSource:
             message: Any = self._consumer.poll(max(end - time.monotonic(), 0.0))
             self._notices.tell()
             if message is None:
-                self._look_for_broker()
+                self._check_broker()
                 return None
             error = message.error()
             if error is None:
@@ -139,12 +139,12 @@ class KafkaSource:
         self._next[message.topic(), message.partition()] = message.offset() + 1
         return bytes(message.value() or b"")
 
-    def _look_for_broker(self) -> None:
+    def _check_broker(self) -> None:
         """See whether a broker that did not answer is back, which a topic without messages does not show."""
         now = time.monotonic()
-        if self._notices.connected or now < self._look_at:
+        if self._notices.connected or now < self._check_at:
             return
-        self._look_at = now + _LOOK_S
+        self._check_at = now + _CHECK_S
         with contextlib.suppress(KafkaException):
             self._consumer.list_topics(self.address.topic, timeout=_ASK_S)
             self._notices.found(self.address)

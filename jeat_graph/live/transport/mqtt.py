@@ -13,7 +13,7 @@ from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
 from jeat_graph.live.transport.mqtt_link import PACKET_MOST, MqttLink
 from jeat_graph.live.transport.names import distinct_name
-from jeat_graph.live.transport.notices import MOST_TOLD, Notices
+from jeat_graph.live.transport.notices import MOST_WARNED, Notices
 from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedError, check, never
 from jeat_graph.live.transport.topics import covers
 
@@ -96,7 +96,7 @@ class MqttSource:
             self._client.ack(message.mid, message.qos)
         elif message.qos:
             self._open.append((self._session, message.mid))
-        if message.topic not in self._foreign and len(self._foreign) < MOST_TOLD:
+        if message.topic not in self._foreign and len(self._foreign) < MOST_WARNED:
             self._foreign.add(message.topic)
             self._client.unsubscribe(message.topic)  # helps unless the subscription had wild cards
             self._notices.add(
@@ -232,13 +232,13 @@ class MqttSink:
         while not done:
             with self._change:
                 done = self._change.wait_for(lambda: enough() or bool(self._link.trouble), SLICE_S)
-            self._look_at_answers()
+            self._check_answers()
             self._notices.tell()
             self._link.check()
             if not done:
                 check(self._overdue, self.address)
 
-    def _look_at_answers(self) -> None:
+    def _check_answers(self) -> None:
         """Go through what the broker said of messages since the last time."""
         while self._answers:
             number, reason = self._answers.popleft()

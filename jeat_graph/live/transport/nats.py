@@ -140,7 +140,7 @@ class NatsSource:
         except TimeoutError:
             pass
         except NatsError:
-            self._gone(timeout_s)
+            self._lost(timeout_s)
         with contextlib.suppress(NatsError, TimeoutError):
             self._presence.check()
         if not self._waiting:
@@ -149,7 +149,7 @@ class NatsSource:
         self._last, self._open = message.metadata.sequence.stream, message
         return bytes(message.data)
 
-    def _gone(self, timeout_s: float) -> None:
+    def _lost(self, timeout_s: float) -> None:
         """Make the consumer anew, which somebody deleted; not at once, since the server may just start."""
         link = self._link
         end = time.monotonic() + timeout_s

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _ASK_S = 0.5
 #: So long what a client that is gone had asked for may still be noted by the server (s).
 _PULLS_FADE_S = 1.5
-_LOOK_S = 0.1
+_CHECK_S = 0.1
 
 
 class Presence:
@@ -107,6 +107,6 @@ class Presence:
         while known.num_waiting:
             if time.monotonic() > end:
                 return True
-            time.sleep(_LOOK_S)
+            time.sleep(_CHECK_S)
             known = link.call(link.jet.consumer_info(link.stream, self._durable))
         return False

@@ -9,7 +9,7 @@ from collections.abc import Callable
 #: Takes one line for the user.
 Tell = Callable[[str], object]
 #: So many things of a kind are told one by one; the rest is counted.
-MOST_TOLD = 5
+MOST_WARNED = 5
 
 
 def say_nothing(_: str) -> None:
@@ -78,9 +78,9 @@ class Notices:
             most: what the broker takes (bytes), or None if it does not say.
         """
         self.too_large += 1
-        if self.too_large <= MOST_TOLD:
+        if self.too_large <= MOST_WARNED:
             bound = "takes" if most is None else f"takes ({most})"
-            more = "; further ones are only counted" if self.too_large == MOST_TOLD else ""
+            more = "; further ones are only counted" if self.too_large == MOST_WARNED else ""
             self.add(
                 f"warning: {where}: an answer of {size} bytes is larger than the broker {bound} and was not "
                 f"sent; raise the broker's bound{more}"

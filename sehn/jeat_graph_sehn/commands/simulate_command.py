@@ -152,11 +152,11 @@ def run(args: argparse.Namespace) -> int:
         return _verify(Path(args.verify))
     if args.scenario is None or args.out is None:
         raise ConfigError("SCENARIO and --out DIR are needed (or --verify DIR)")
-    told = [name for name in _CORRIDOR_ONLY if getattr(args, name) is not None]
+    misplaced = [name for name in _CORRIDOR_ONLY if getattr(args, name) is not None]
     if args.scenario == "corridor":
         return _corridor(args)
-    if told:
-        raise ConfigError(f"--{told[0]} goes with the scenario corridor")
+    if misplaced:
+        raise ConfigError(f"--{misplaced[0]} goes with the scenario corridor")
     unfit = [*(_PICTURE_ONLY if args.sensors == "detections" else ("duration",))]
     unfit += [] if args.sensors in ("detections", "pictures") else ["rig"]
     unfit += [] if args.sensors == "carla" else _CARLA_ONLY

@@ -135,7 +135,7 @@ def test_lines_zones_masks_and_lengths_are_drawn_with_the_mouse(browser, server,
     at("click", (330, 300))
     browser.click("save")
     assert "each length needs its metres" in browser.until(
-        "return document.getElementById('said').textContent"
+        "return document.getElementById('status').textContent"
     )
     assert not (tmp_path / "marks.yaml").exists()
     browser.script(
@@ -145,7 +145,7 @@ def test_lines_zones_masks_and_lengths_are_drawn_with_the_mouse(browser, server,
     # A corner is dragged: the line's second point.
     browser.mouse(("down", left + 300, top + 120), ("up", left + 310, top + 140))
     browser.click("done")
-    browser.until("return document.getElementById('said').textContent.startsWith('Saved')")
+    browser.until("return document.getElementById('status').textContent.startsWith('Saved')")
     marks = read_marks_file(tmp_path / "marks.yaml", ("lines",))
     assert list(marks.lines) == ["line-1"]
     np.testing.assert_allclose(marks.lines["line-1"], (100, 100, 310, 140), atol=1.5)

@@ -19,7 +19,7 @@ def _fit_upright(network: Network) -> Fit:
 def _fit_turned(network: Network) -> Fit:
     if network.export.task == TURNED:
         return _fit(network)
-    return Fit.NO if network.export.task_said else min(_fit(network, 1), Fit.POSSIBLE)
+    return Fit.NO if network.export.declared_task else min(_fit(network, 1), Fit.POSSIBLE)
 
 
 def _fit(network: Network, beside: int = 0) -> Fit:

@@ -39,13 +39,13 @@ def recognise(network: Network) -> OutputLayout:
     found = [name for name, fit in fits.items() if fit == best]
     if best <= Fit.POSSIBLE:
         raise DataError(
-            f"has outputs of no layout that is known: {shapes_of(network.outputs)}{network.export.said}; say "
-            f"which with layout: one of {', '.join(all_layouts())}"
+            f"has outputs of no layout that is known: {shapes_of(network.outputs)}"
+            f"{network.export.description}; say which with layout: one of {', '.join(all_layouts())}"
         )
     if len(found) > 1:
         raise DataError(
-            f"has outputs of {' or '.join(found)}: {shapes_of(network.outputs)}{network.export.said}; say "
-            "which with layout"
+            f"has outputs of {' or '.join(found)}: {shapes_of(network.outputs)}{network.export.description}; "
+            "say which with layout"
         )
     return all_layouts()[found[0]]
 
@@ -60,7 +60,7 @@ def asked_for(name: str, network: Network) -> OutputLayout:
     if layout.fit(network) == Fit.NO:
         raise DataError(
             f"cannot be of the layout {name}: its outputs are {shapes_of(network.outputs)}"
-            f"{network.export.said}"
+            f"{network.export.description}"
         )
     return layout
 

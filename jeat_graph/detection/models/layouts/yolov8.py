@@ -30,7 +30,7 @@ def _fit_turned(network: Network) -> Fit:
     if network.export.task == TURNED:
         return _fit(network, turned=True)
     # Without a task in the notes it may be, if the user says so.
-    return Fit.NO if network.export.task_said else min(_fit(network, turned=True), Fit.POSSIBLE)
+    return Fit.NO if network.export.declared_task else min(_fit(network, turned=True), Fit.POSSIBLE)
 
 
 def _fit(network: Network, *, turned: bool) -> Fit:
@@ -44,7 +44,7 @@ def _fit(network: Network, *, turned: bool) -> Fit:
     if numbers == own and upright is not None:
         if export.classes is None:
             return Fit.EXACT if upright == cell_count(network.side) else Fit.FORM
-        return Fit.NOTES if export.task_said else Fit.EXACT
+        return Fit.NOTES if export.declared_task else Fit.EXACT
     # Rows as long as the cells are many, of other classes than the notes say, are refused by `classes`.
     across = network.table[1] == upright
     return Fit.FORM if across else Fit.POSSIBLE

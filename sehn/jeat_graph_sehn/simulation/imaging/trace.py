@@ -18,7 +18,7 @@ from jeat_graph_sehn.simulation.imaging.tiles import View
 # Where a pixel is sampled: a turned square, so that edges along rows and columns get four steps, not two.
 _SAMPLES = np.array([[0.125, 0.625], [0.375, 0.125], [0.625, 0.875], [0.875, 0.375]])
 _DIAGONALS = np.array([1, 2, 0, 3])  # the two on each diagonal have the pixel's centre as their mean
-_ALIKE = 0.05  # relative difference of two samples that stand for all four
+_UNIFORM = 0.05  # relative difference of two samples that stand for all four
 _POLE_RADIUS_M, _POST_M = 0.11, 4.0
 _NEAR_GROUND_M = 40.0
 _TREES_FAR_M, _MAX_GROUND_M = 650.0, 3000.0
@@ -180,9 +180,9 @@ def trace(
     for row in range(height):
         for column in range(width):
             road_lamps = -1.0
-            kinds, level, alike = 0, 0.0, False
+            kinds, level, uniform = 0, 0.0, False
             for turn in range(len(_SAMPLES)):
-                if alike:
+                if uniform:
                     break
                 k = turn if every else _DIAGONALS[turn]
                 u, v = column + _SAMPLES[k, 0], row + _SAMPLES[k, 1]
@@ -255,8 +255,8 @@ def trace(
                 if turn == 0:
                     kinds, level = kind, back[row, column, 1]
                 elif turn == 1 and not every and kind == kinds and cover[row, column] == 0.0:
-                    alike = abs(back[row, column, 1] - 2.0 * level) < _ALIKE * level
-            if alike:
+                    uniform = abs(back[row, column, 1] - 2.0 * level) < _UNIFORM * level
+            if uniform:
                 lux[row, column] *= 2.0
                 for c in range(3):
                     back[row, column, c] *= 2.0

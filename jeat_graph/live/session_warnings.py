@@ -15,10 +15,10 @@ from jeat_graph.live.messages import ScanMessage
 from jeat_graph.live.untaken import Untaken, UntakenRun
 
 #: So many scans passed over are told one by one; the rest is in the summary.
-MOST_TOLD = 5
+MOST_WARNED = 5
 
 
-class Told:
+class SessionWarnings:
     """Tells it.
 
     Args:
@@ -88,7 +88,7 @@ class Told:
             )
         for scan in arrival.refuted:
             self._scans += 1
-            if self._scans <= MOST_TOLD:
+            if self._scans <= MOST_WARNED:
                 self._warn(
                     f"warning: passed over, sensor {scan.sensor!r} gave the time {scan.t:.3f} s, which no "
                     "other scan confirms"
@@ -110,8 +110,8 @@ class Told:
 
     def _first(self, number: int, text: str) -> None:
         """Tell of something that may come often, the first times."""
-        if number <= MOST_TOLD:
-            more = "; further ones are only counted" if number == MOST_TOLD else ""
+        if number <= MOST_WARNED:
+            more = "; further ones are only counted" if number == MOST_WARNED else ""
             self._warn(f"warning: {text}{more}")
 
 
@@ -131,7 +131,7 @@ class BadLines:
     def __init__(self, warn: Callable[[str], object]) -> None:
         self._warn = warn
         self._run = UntakenRun(math.inf)
-        self._told = self._good = 0
+        self._bad = self._good = 0
 
     def add(self, error: DataError, good: int) -> None:
         """Tell of one.
@@ -144,8 +144,8 @@ class BadLines:
             self._good = good
             self._run.taken()
         again = self._run.untaken(0.0)
-        self._told += 1
-        if self._told <= MOST_TOLD:
+        self._bad += 1
+        if self._bad <= MOST_WARNED:
             self._warn(f"warning: {error}; passed over")
         elif again:
             self._warn(f"warning: the last {self._run.count} were all passed over; {error}")

@@ -27,7 +27,7 @@ _LEAST_VARIANCE = 1e-6
 _MOST_RATIO = 6.0
 
 
-class LookModel(NamedTuple):
+class AppearanceModel(NamedTuple):
     """How alike one vehicle looks at both cameras, and how alike two vehicles look.
 
     Attributes:
@@ -51,7 +51,7 @@ class LookModel(NamedTuple):
         return np.where(np.isfinite(cosine), np.clip(found, -_MOST_RATIO, _MOST_RATIO), 0.0)
 
 
-def learn_looks(cosine: FloatArray, probability: FloatArray) -> LookModel | None:
+def learn_appearance(cosine: FloatArray, probability: FloatArray) -> AppearanceModel | None:
     """Learn how alike vehicles look.
 
     Args:
@@ -78,15 +78,15 @@ def learn_looks(cosine: FloatArray, probability: FloatArray) -> LookModel | None
     if not kept:
         return None
     middle = other + 0.5 * step
-    return LookModel(middle + 0.5 * kept * step, middle - 0.5 * kept * step, math.sqrt(variance))
+    return AppearanceModel(middle + 0.5 * kept * step, middle - 0.5 * kept * step, math.sqrt(variance))
 
 
-def centred(looks: FloatArray) -> FloatArray:
+def centred(appearance: FloatArray) -> FloatArray:
     """Return embeddings (N, E) less their mean, of unit length; NaN where there are none."""
-    known = np.isfinite(looks).all(axis=1)
-    out = np.full(looks.shape, np.nan)
+    known = np.isfinite(appearance).all(axis=1)
+    out = np.full(appearance.shape, np.nan)
     if known.any():
-        rest = looks[known] - looks[known].mean(axis=0)
+        rest = appearance[known] - appearance[known].mean(axis=0)
         length = np.linalg.norm(rest, axis=1, keepdims=True)
         out[known] = np.where(length > 1e-9, rest / np.maximum(length, 1e-9), np.nan)
     return out

@@ -10,10 +10,10 @@ import pytest
 pytest.importorskip("jeat_graph_sehn")
 
 from jeat_graph.cli.main import main
+from jeat_graph.corridor.appearance import centred, learn_appearance
 from jeat_graph.corridor.gap_model import Gap
 from jeat_graph.corridor.handover import KnownGap, solve
-from jeat_graph.corridor.looks import centred, learn_looks
-from jeat_graph.corridor.passage_looks import check_looks, track_looks, with_looks
+from jeat_graph.corridor.passage_appearance import check_appearance, track_appearance, with_appearance
 from jeat_graph.corridor.passages import read_passages
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import DataError
@@ -31,7 +31,7 @@ def test_means_and_spreads_follow_from_unsure_pairs():
     p = rng.beta(0.4, 1.5, 40_000)
     same = rng.random(len(p)) < p
     x = np.where(same, rng.normal(0.5, 0.1, len(p)), rng.normal(0.1, 0.2, len(p)))
-    found = learn_looks(x, p)
+    found = learn_appearance(x, p)
     assert found.same == pytest.approx(0.5, abs=0.01)
     assert found.other == pytest.approx(0.1, abs=0.01)
     assert found.sigma == pytest.approx(np.sqrt((0.1**2 + 0.2**2) / 2.0), rel=0.03)
@@ -45,18 +45,18 @@ def test_means_and_spreads_follow_from_unsure_pairs():
 def test_nothing_is_learnt_of_nothing():
     rng = np.random.default_rng(1)
     p = rng.beta(0.4, 1.5, 2000)
-    assert learn_looks(np.full(2000, np.nan), p) is None
-    assert learn_looks(rng.normal(size=2000), np.full(2000, 0.3)) is None
-    found = [learn_looks(rng.normal(size=2000), p) for _ in range(50)]
+    assert learn_appearance(np.full(2000, np.nan), p) is None
+    assert learn_appearance(rng.normal(size=2000), np.full(2000, 0.3)) is None
+    found = [learn_appearance(rng.normal(size=2000), p) for _ in range(50)]
     assert max(0.0 if one is None else one.d_prime for one in found) < 0.3
     assert sum(one is None for one in found) > 25
 
 
 def test_what_a_camera_does_to_all_counts_for_nothing():
-    looks = np.random.default_rng(2).normal(size=(30, 5))
-    looks[3] = np.nan
-    np.testing.assert_allclose(centred(looks + 7.0), centred(looks), atol=1e-12)
-    assert np.isnan(centred(looks)[3]).all()
+    appearance = np.random.default_rng(2).normal(size=(30, 5))
+    appearance[3] = np.nan
+    np.testing.assert_allclose(centred(appearance + 7.0), centred(appearance), atol=1e-12)
+    assert np.isnan(centred(appearance)[3]).all()
 
 
 @pytest.fixture(scope="module")
@@ -80,8 +80,8 @@ def dressed(dense, likeness):
     for passages, vehicle in dense:
         noise = rng.normal(size=(len(vehicle), NUMBERS))
         known = np.where(vehicle[:, None] >= 0, own[vehicle], rng.normal(size=noise.shape))
-        looks = np.sqrt(likeness) * known + np.sqrt(1.0 - likeness) * noise
-        out.append(replace(passages, looks=looks + 0.3))
+        appearance = np.sqrt(likeness) * known + np.sqrt(1.0 - likeness) * noise
+        out.append(replace(passages, appearance=appearance + 0.3))
     return Gap.of(*out)
 
 
@@ -98,35 +98,35 @@ def solved(gap):
 
 def test_looks_of_known_worth_are_learnt_and_help(dense):
     gap = dressed(dense, 0.45)
-    cosine = gap.looks[0] @ gap.looks[1].T
+    cosine = gap.appearance[0] @ gap.appearance[1].T
     same = (dense[0][1][:, None] == dense[1][1][None]) & (dense[0][1][:, None] >= 0)
     truth = cosine[same].mean() - cosine[~same].mean()
     truth /= np.sqrt((cosine[same].var() + cosine[~same].var()) / 2.0)
     assert truth == pytest.approx(2.0, abs=0.3)
     over = solved(gap)
-    assert over.fitted.parameters.looks.d_prime == pytest.approx(truth, rel=0.2)
+    assert over.fitted.parameters.appearance.d_prime == pytest.approx(truth, rel=0.2)
     plain = solved(Gap.of(dense[0][0], dense[1][0]))
     assert f1_of(over, dense) > f1_of(plain, dense) + 0.015
 
 
 def test_looks_that_tell_nothing_change_nothing(dense):
     over, plain = solved(dressed(dense, 0.0)), solved(Gap.of(dense[0][0], dense[1][0]))
-    looks = over.fitted.parameters.looks
-    assert looks is None or looks.d_prime < 0.3
+    appearance = over.fitted.parameters.appearance
+    assert appearance is None or appearance.d_prime < 0.3
     assert f1_of(over, dense) == pytest.approx(f1_of(plain, dense), abs=0.01)
 
 
 def test_a_track_looks_like_the_detections_it_took():
     boxes = np.array([[0.0, 0, 10, 10], [50, 0, 10, 10]])
     t = np.repeat([0.0, 0.1], 2)
-    looks = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    appearance = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
     rows = np.array([*boxes, *boxes, [200.0, 0, 10, 10]])
-    found = Detections.from_rows([*t, 0.1], np.full(5, "rgb"), rows, np.ones(5), embeddings=looks)
+    found = Detections.from_rows([*t, 0.1], np.full(5, "rgb"), rows, np.ones(5), embeddings=appearance)
     tracks = Trajectories(
         t, np.array([4, 9, 4, 9]), np.tile(boxes, (2, 1)), np.ones(4), np.zeros((4, 6)), np.zeros((4, 6)),
         np.ones(4, dtype=np.int64), ("rgb",),
     )  # fmt: skip
-    ids, mean = track_looks(tracks, found)
+    ids, mean = track_appearance(tracks, found)
     assert ids.tolist() == [4, 9]
     np.testing.assert_allclose(centred(mean) @ centred(mean).T, [[1.0, -1.0], [-1.0, 1.0]], atol=1e-6)
     np.testing.assert_allclose(mean / np.linalg.norm(mean, axis=1, keepdims=True), np.eye(2), atol=1e-6)
@@ -135,15 +135,17 @@ def test_a_track_looks_like_the_detections_it_took():
 def test_embeddings_that_are_not_there_are_refused(dense, tmp_path):
     (a, _), (b, _) = dense
     with pytest.raises(DataError, match=r"has no detections\.csv"):
-        with_looks(a, tmp_path)
+        with_appearance(a, tmp_path)
     boxes = np.array([[0.0, 0, 10, 10]])
     write_detections(Detections.from_rows([0.0], ["rgb"], boxes, [1.0]), tmp_path / "detections.csv")
     with pytest.raises(DataError, match="has no embeddings"):
-        with_looks(a, tmp_path)
+        with_appearance(a, tmp_path)
     with pytest.raises(DataError, match="no camera beside it"):
-        check_looks([replace(a, looks=np.ones((len(a), 2))), b])
+        check_appearance([replace(a, appearance=np.ones((len(a), 2))), b])
     with pytest.raises(DataError, match="2 numbers and those of B 3"):
-        check_looks([replace(a, looks=np.ones((len(a), 2))), replace(b, looks=np.ones((len(b), 3)))])
+        check_appearance(
+            [replace(a, appearance=np.ones((len(a), 2))), replace(b, appearance=np.ones((len(b), 3)))]
+        )
 
 
 def test_an_unknown_camera_is_refused(road, tmp_path, capsys):
@@ -162,8 +164,8 @@ def test_the_command_takes_them_from_runs(road, tmp_path, capsys):
         rows = [(int(row[1]), int(row[2])) for row in truth if row[0] == name]
         ids, vehicle = np.array(rows).T
         t, box = ids * 0.1, np.tile([10.0, 10.0, 20.0, 20.0], (len(ids), 1))
-        looks = own[vehicle] + 0.5 * rng.normal(size=(len(ids), NUMBERS))
-        found = Detections.from_rows(t, np.full(len(t), "rgb"), box, np.ones(len(t)), embeddings=looks)
+        appearance = own[vehicle] + 0.5 * rng.normal(size=(len(ids), NUMBERS))
+        found = Detections.from_rows(t, np.full(len(t), "rgb"), box, np.ones(len(t)), embeddings=appearance)
         run = tmp_path / name
         run.mkdir()
         write_detections(found, run / "detections.csv")

@@ -26,7 +26,7 @@ _LEAST_OVERLAP = 0.5
 _SAME_TIME_S = 1e-4
 
 
-def with_looks(passages: Passages, run: str | Path) -> Passages:
+def with_appearance(passages: Passages, run: str | Path) -> Passages:
     """Return passages with the embeddings of their tracks.
 
     Args:
@@ -43,17 +43,17 @@ def with_looks(passages: Passages, run: str | Path) -> Passages:
     detections = read_detections(found)
     if detections.embeddings is None:
         raise DataError("has no embeddings: `track --frames … --embedder colour` makes some", found)
-    ids, looks = track_looks(read_trajectories(run_table(root)), detections)
+    ids, appearance = track_appearance(read_trajectories(run_table(root)), detections)
     place = {int(k): row for row, k in enumerate(ids)}
     rows = np.array([place.get(int(k), -1) for k in passages.track_id], dtype=np.int64)
     if not (rows >= 0).any():
         raise DataError(f"has embeddings of none of the vehicles at camera {passages.camera}", root)
-    out = np.full((len(rows), looks.shape[1]), np.nan)
-    out[rows >= 0] = looks[rows[rows >= 0]]
-    return replace(passages, looks=out)
+    out = np.full((len(rows), appearance.shape[1]), np.nan)
+    out[rows >= 0] = appearance[rows[rows >= 0]]
+    return replace(passages, appearance=out)
 
 
-def check_looks(cameras: Sequence[Passages]) -> None:
+def check_appearance(cameras: Sequence[Passages]) -> None:
     """Refuse embeddings that can be compared with no others.
 
     Args:
@@ -64,8 +64,8 @@ def check_looks(cameras: Sequence[Passages]) -> None:
     """
     for k, one in enumerate(cameras):
         beside = (*cameras[max(k - 1, 0) : k], *cameras[k + 1 : k + 2])
-        known = [other for other in beside if other.looks is not None]
-        if one.looks is None:
+        known = [other for other in beside if other.appearance is not None]
+        if one.appearance is None:
             continue
         if not known:
             raise DataError(
@@ -73,14 +73,14 @@ def check_looks(cameras: Sequence[Passages]) -> None:
                 "compared from camera to camera"
             )
         for other in known:
-            if other.looks is not None and other.looks.shape[1] != one.looks.shape[1]:
+            if other.appearance is not None and other.appearance.shape[1] != one.appearance.shape[1]:
                 raise DataError(
-                    f"--embeddings: those of {one.camera} have {one.looks.shape[1]} numbers and those of "
-                    f"{other.camera} {other.looks.shape[1]}: use one --embedder for all"
+                    f"--embeddings: those of {one.camera} have {one.appearance.shape[1]} numbers, those of "
+                    f"{other.camera} {other.appearance.shape[1]}: use one --embedder for all"
                 )
 
 
-def track_looks(tracks: Trajectories, detections: Detections) -> tuple[np.ndarray, FloatArray]:
+def track_appearance(tracks: Trajectories, detections: Detections) -> tuple[np.ndarray, FloatArray]:
     """Return the identities (K,) of tracks whose detections have embeddings, and the mean (K, E) of these."""
     assert detections.embeddings is not None
     order = np.argsort(tracks.t, kind="stable")
