@@ -21,6 +21,7 @@ EXAMPLES = {
     "detect": "jeat-graph detect --frames night.mp4 --events night.raw --out detections.csv",
     "detectors": "jeat-graph detectors --fetch yolox-s",
     "train": "jeat-graph train frames train-day --out frames.onnx",
+    "teach": "jeat-graph teach run --events night.raw --detector sehn --out mine.onnx",
     "track": "jeat-graph track detections.csv --out run",
     "stream": "jeat-graph stream --format csv < scans.jsonl > tracks.csv",
     "serve": "jeat-graph serve --check gantry7.yaml",

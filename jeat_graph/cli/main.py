@@ -50,11 +50,12 @@ COMMANDS = (
     "detect",
     "detectors",
     "train",
+    "teach",
     "calibrate",
     "register",
 )
 # Those that a distribution of its own brings.
-_BESIDE = ("simulate", "train")
+_BESIDE = ("simulate", "train", "teach")
 
 
 # For these, `--out -` is standard output.

@@ -24,11 +24,13 @@ PACKAGE = ROOT / "jeat_graph_sehn"
 #: Modules of jeat-graph that are public for distributions beside it; docs/design.md lists them, too.
 PUBLIC = {
     "jeat_graph",
+    "jeat_graph.association.overlap",
     "jeat_graph.cli.options",
     "jeat_graph.cli.terminal",
     "jeat_graph.config.argument_types",
     "jeat_graph.config.fields",
     "jeat_graph.config.rig_file",
+    "jeat_graph.config.schema",
     "jeat_graph.config.section_tree",
     "jeat_graph.config.sensors",
     "jeat_graph.config.yaml_text",
@@ -74,6 +76,7 @@ PUBLIC = {
     "jeat_graph.io.tables.truth_io",
     "jeat_graph.io.media.video",
     "jeat_graph.io.media.video_writer",
+    "jeat_graph.rig.common_picture",
     "jeat_graph.road.camera",
     "jeat_graph.road.camera_map",
     "jeat_graph.runs.demo_recording",
