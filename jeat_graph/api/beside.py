@@ -6,9 +6,13 @@ functions that commands and `jeat_graph` itself call.
 
 from __future__ import annotations
 
-from typing import Any
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
 from jeat_graph.data.errors import ConfigError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint, EntryPoints
 
 COMMAND_GROUP = "jeat_graph.commands"
 FUNCTION_GROUP = "jeat_graph.functions"
@@ -30,9 +34,28 @@ def find(group: str, name: str, asked: str) -> Any:
     """
     from importlib.metadata import entry_points  # takes longer to load than most commands' own modules
 
-    for point in entry_points(group=group, name=name):
+    found = list(entry_points(group=group, name=name)) or _newer_command(name, entry_points(group=group))
+    for point in found:
         try:
             return point.load()
         except (ImportError, AttributeError) as error:
             raise ConfigError(f"{asked} cannot be loaded from {point.value}: {error}") from None
     raise ConfigError(f"{asked} {HOW_TO_GET}")
+
+
+def _newer_command(name: str, others: EntryPoints) -> list[EntryPoint]:
+    """Return the entry point that a command would have, if it lies beside others; else nothing.
+
+    Who installed a checkout as editable and updated it later has commands that its entry points do not name.
+    """
+    from importlib.metadata import EntryPoint
+    from importlib.util import find_spec
+
+    for package in sorted(
+        {point.value.rpartition(".")[0] for point in others if point.group == COMMAND_GROUP}
+    ):
+        module = f"{package}.{name}_command"
+        with suppress(ModuleNotFoundError):  # the package itself is gone
+            if find_spec(module) is not None:
+                return [EntryPoint(name, module, COMMAND_GROUP)]
+    return []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
@@ -39,6 +39,7 @@ def one_line(capsys) -> str:
         ),
         (["simulate", "--help"], "jeat-graph simulate: the command comes with jeat-graph-sehn"),
         (["train", "frames", "sim", "--out", "n.onnx"], "jeat-graph train: the command comes with"),
+        (["teach", "run", "--events", "e.h5", "--out", "n.onnx"], "jeat-graph teach: the command comes with"),
         (["export", "sim", "--to", "rvt", "--out", "x"], "jeat-graph export: --to rvt comes with"),
         (["demo", "--scenario", "day", "--out", "x"], "jeat-graph demo: another highway comes with"),
         (["demo", "--seed", "3", "--out", "x"], "jeat-graph demo: another highway comes with"),
@@ -92,3 +93,19 @@ def test_one_that_cannot_be_loaded_is_named(monkeypatch, capsys):
 def test_a_command_of_before_says_where_it_went(capsys):
     assert main(["benchmark", "real"]) == 2
     assert "python -m benchmarks" in one_line(capsys)
+
+
+def test_a_checkout_that_is_newer_than_its_entry_points_has_its_commands(tmp_path, monkeypatch, capsys):
+    """As `git pull` leaves an editable install: the module is there, and no entry point names it."""
+    package = tmp_path / "pulled"
+    package.mkdir()
+    (package / "__init__.py").write_text("", encoding="utf-8")
+    text = "HELP = 'new'\ndef add_arguments(parser): ...\ndef run(args): print('taught')\n"
+    (package / "teach_command.py").write_text(text, encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    old = EntryPoints([EntryPoint("train", "pulled.train_command", "jeat_graph.commands")])
+    monkeypatch.setattr(importlib.metadata, "entry_points", old.select)
+    assert main(["teach"]) == 0
+    assert capsys.readouterr().out == "taught\n"
+    assert main(["simulate"]) == 2
+    assert "comes with jeat-graph-sehn, which is not installed" in one_line(capsys)
