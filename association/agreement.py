@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 
 # Detections of two sensors this close in time tell whether one track has both (s).
 _BESIDE_S = 0.1
@@ -120,9 +120,9 @@ def _with_sensors_together(seen: SeenBoxes, assignments: IntArray, piece: IntArr
     members = [order[a:b] for a, b in pairwise(ends)]
     found = []
     for x, y in _beside(seen, assignments[:1], own):
-        if _agreement(seen, assignments[:1], members[x], members[y])[0] > 0.0:
-            share, number = _agreement(seen, assignments, members[x], members[y])
-            found.append((-share, -number, x, y))
+        same, number = _agreement(seen, assignments, members[x], members[y])
+        if same[:1].any():
+            found.append((-float(same.mean()), -number, x, y))
     group = {k: [k] for k in range(len(members))}
     of = list(range(len(members)))
     for _, _, x, y in sorted(found):
@@ -150,15 +150,18 @@ def _beside(seen: SeenBoxes, assignments: IntArray, piece: IntArray) -> list[tup
     return [(int(one) // count, int(one) % count) for one in code]
 
 
-def _agreement(seen: SeenBoxes, assignments: IntArray, x: IntArray, y: IntArray) -> tuple[float, int]:
-    """Return the share of passes that give two pieces to one track while both are there, and of how many."""
+def _agreement(seen: SeenBoxes, assignments: IntArray, x: IntArray, y: IntArray) -> tuple[BoolArray, int]:
+    """Return which passes (R,) give two pieces to one track while both are there, and in how many detections.
+
+    None (R = 0) where they are not there together.
+    """
     low = max(seen.t[x[0]], seen.t[y[0]]) - _BESIDE_S
     high = min(seen.t[x[-1]], seen.t[y[-1]]) + _BESIDE_S
     x, y = (one[(seen.t[one] >= low) & (seen.t[one] <= high)] for one in (x, y))
     if not len(x) or not len(y):
-        return 0.0, 0
+        return np.zeros(0, dtype=np.bool_), 0
     same = [_usual(assignment[x]) == _usual(assignment[y]) for assignment in assignments]
-    return float(np.mean(same)), min(len(x), len(y))
+    return np.array(same, dtype=np.bool_), min(len(x), len(y))
 
 
 def _usual(values: IntArray) -> int:

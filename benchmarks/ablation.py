@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
 _NAME = "ablation"
-_SHARED = "../shared/data"
 #: Simulated sets, of which no recording needs to be there, and the length of their recordings (s).
 _WORLDS, _WORLD_S = ("day", "night-nolight"), 15.0
 _NEARBY = 4
@@ -80,7 +79,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = "example: python -m benchmarks ablation RECORDINGS --readme docs/method.md"
     common.declare(parser, _NAME, {"seeds": "of the simulated recordings (0)"})
     add = parser.add_argument
-    add("root", nargs="?", default=_SHARED, metavar="ROOT", help=f"folder of the recordings ({_SHARED})")
+    add(
+        "root",
+        nargs="?",
+        default=common.SHARED,
+        metavar="ROOT",
+        help=f"folder of the recordings ({common.SHARED})",
+    )
     add("--rate", type=positive, metavar="HZ", help="frame rate where the files do not say it")
     add("--sets", nargs="+", metavar="NAME", help="take these sets of the folder alone")
     add("--terms", nargs="+", choices=list(TERMS), metavar="TERM", help="judge these terms alone")

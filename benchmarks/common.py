@@ -17,6 +17,8 @@ from jeat_graph.data.errors import DataError
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Table
 
+#: Where recordings that are not in the repository lie beside a checkout.
+SHARED = "../shared/data"
 #: What an argument takes, of those that several benchmarks have and each explains in its own words.
 _OPTIONAL: Mapping[str, dict[str, Any]] = {
     "data": {"metavar": "DIR"},

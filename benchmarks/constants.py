@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from jeat_graph.filters.model_constants import ModelConstants
 
 _NAME = "constants"
-_SHARED = "../shared/data"
 _STEPS = (0.7, 1.4)
 _MOST = 20
 #: Points near the shipped constants, over which scores are averaged.
@@ -54,7 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     common.declare(parser, _NAME, {"seeds": "of the random starts (0)"})
     add = parser.add_argument
-    add("root", nargs="?", default=_SHARED, metavar="ROOT", help=f"folder of the recordings ({_SHARED})")
+    add(
+        "root",
+        nargs="?",
+        default=common.SHARED,
+        metavar="ROOT",
+        help=f"folder of the recordings ({common.SHARED})",
+    )
     add("--rate", type=positive, metavar="HZ", help="frame rate where the files do not say it")
     add("--sets", nargs="+", metavar="NAME", help="take these sets alone; at least two")
     add("--only", nargs="+", metavar="NAME", help="move these constants alone (all)")

@@ -35,7 +35,6 @@ from jeat_graph.data.errors import ConfigError
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
-_SHARED = "../shared/data"
 _QUICK_RECORDINGS = 2
 #: What of a table is shown beside the headline, and its digits.
 _SHOWN = {"DetA": 1, "AssA": 1, "MOTP": 1, "FP": 0, "FN": 0, "IDSW": 0}
@@ -47,11 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     kind = parser.prog.split()[-1]
     declare_trackers(parser, kind)
     add = parser.add_argument
-    given: dict[str, Any] = {"nargs": "?", "default": _SHARED} if kind == "real" else {}
+    given: dict[str, Any] = {"nargs": "?", "default": common.SHARED} if kind == "real" else {}
     add(
         "root",
         metavar="ROOT",
-        help="folder of the recordings" + (f" ({_SHARED})" if given else ""),
+        help="folder of the recordings" + (f" ({common.SHARED})" if given else ""),
         **given,
     )
     add(
@@ -182,7 +181,7 @@ def _command(args: argparse.Namespace) -> str:
     """The command that made a result, without what says where it is written."""
     words = [
         args.kind,
-        *([args.root] if getattr(args, "root", _SHARED) != _SHARED or args.kind == "mot" else []),
+        *([args.root] if getattr(args, "root", common.SHARED) != common.SHARED or args.kind == "mot" else []),
     ]
     for option in (
         "detections",

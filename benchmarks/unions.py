@@ -26,7 +26,6 @@ from jeat_graph.config.argument_types import counting, positive
 if TYPE_CHECKING:
     from jeat_graph.eval.tables import Cell, Table
 
-_SHARED = "../shared/data"
 #: A recording with fewer boxes of truth is not drawn for: its scores are luck.
 _LEAST_ROWS = 1000
 #: A union fails that is worse than the best alone by more than so much in one score; of its own detectors and
@@ -50,9 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "root",
         nargs="?",
-        default=_SHARED,
+        default=common.SHARED,
         metavar="ROOT",
-        help=f"folder of recordings with detections and truth ({_SHARED})",
+        help=f"folder of recordings with detections and truth ({common.SHARED})",
     )
     add("--rate", type=positive, default=25.0, metavar="HZ", help="frames per second where not known (25)")
     add("--draws", type=counting, default=10, metavar="N", help="draws of each recording (10)")

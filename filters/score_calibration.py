@@ -18,8 +18,10 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.filters.box_sides import intersection_over_union
 from jeat_graph.filters.model_constants import ModelConstants
 
-#: Logits at which the share is estimated, and the bandwidth of the kernel.
-SCORE_GRID = np.arange(-4.5, 7.01, 0.25)
+# Logits at which the share is estimated (the first, their distance, how many), and the kernel's bandwidth.
+_FIRST_LOGIT, _LOGIT_STEP, _SCORE_BINS = -4.5, 0.25, 47
+#: These logits.
+SCORE_GRID = _FIRST_LOGIT + _LOGIT_STEP * np.arange(_SCORE_BINS)
 _BANDWIDTH = 0.35
 # The share of the best boxes that divides the others starts with the prior of so many boxes.
 _BEST_COUNT = 5.0

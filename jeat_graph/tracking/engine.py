@@ -20,6 +20,9 @@ from jeat_graph.smoothers.rows import ModelRows
 from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.sensor_state import SensorState
 
+#: After so long without any scan all tracks are over: longer predictions outgrow a double's digits (s).
+LONGEST_SILENCE_S = 300.0
+
 
 class StepInput(NamedTuple):
     """What sensors saw at one time, M boxes of K sensors.

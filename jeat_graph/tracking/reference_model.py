@@ -19,14 +19,11 @@ from jeat_graph.filters.score_calibration import logit
 from jeat_graph.filters.singer import STATES
 from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import Called, ModelRows, joined, rows_of
-from jeat_graph.tracking.engine import Moment, Recorded, StepInput, lacking
+from jeat_graph.tracking.engine import LONGEST_SILENCE_S, Moment, Recorded, StepInput, lacking
 from jeat_graph.tracking.one_model import Learnt, OneModel, even_logit_of, row_output
 from jeat_graph.tracking.reference import step
 from jeat_graph.tracking.reference_life import reset
 from jeat_graph.tracking.reference_state import ReferenceState, SensorScan, declare_sensor, initial_state
-
-#: After so long without any scan all tracks are over (s).
-_LONGEST_SILENCE_S = 300.0
 
 
 class Answer(NamedTuple):
@@ -82,7 +79,7 @@ class ReferenceModel(OneModel):
         t, similarity, motion, owners = inputs.t, inputs.similarity, inputs.motion, inputs.owners
         sides = np.concatenate([inputs.boxes[:, :2], inputs.boxes[:, :2] + inputs.boxes[:, 2:]], axis=1)
         logits, ends = logit(inputs.scores), np.cumsum(inputs.numbers)
-        is_reset = self._state.t is not None and t - self._state.t >= _LONGEST_SILENCE_S
+        is_reset = self._state.t is not None and t - self._state.t >= LONGEST_SILENCE_S
         if is_reset:
             reset(self._state, t, self.constants)
             similarity = motion = None

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "association/assignment.hpp"
+#include "constants.hpp"
 #include "filters/box_sides.hpp"
 
 namespace jeat::association {
@@ -13,10 +14,6 @@ namespace jeat::association {
 using filters::ModelConstants;
 using filters::Sides;
 using filters::SidesExpected;
-
-inline constexpr double kLeastPDetect = 0.01, kMostPDetect = 0.99, kLeastPosterior = 0.02;
-// Of a pair that is possible, however little it looks alike.
-inline constexpr double kLeastGain = 1e-9;
 
 // What holds for all pairs of one scan.
 struct ScanTerms {

@@ -4,15 +4,13 @@
 #include <array>
 #include <cmath>
 
+#include "constants.hpp"
 #include "filters/boxes.hpp"
 #include "filters/model_constants.hpp"
 #include "filters/singer.hpp"
 #include "math.hpp"
 
 namespace jeat::filters {
-
-inline constexpr double kLog2Pi = 1.8378770664093454;
-inline constexpr double kLeastProbability = 0.02, kLeastWeight = 1e-3, kOutwards = -20.0, kMostDistance = 200.0, kUnmeasured = 100.0;
 
 // A symmetric 2 x 2 matrix.
 struct Pair2 {

@@ -7,6 +7,7 @@
 #include <limits>
 #include <vector>
 
+#include "constants.hpp"
 #include "filters/singer.hpp"
 
 namespace jeat::filters {
@@ -18,8 +19,6 @@ struct Sides {
     double height() const { return bottom - top; }
     double area() const { return width() * height(); }
 };
-
-inline constexpr double kLeastArea = 1e-9;
 
 inline double intersection(const Sides& a, const Sides& b) {
     const double w = std::min(a.right, b.right) - std::max(a.left, b.left);

@@ -5,13 +5,10 @@
 #include <array>
 #include <vector>
 
+#include "constants.hpp"
 #include "filters/box_sides.hpp"
 
 namespace jeat::filters {
-
-inline constexpr double kPairingGate = 12.0, kPairingDeviations = 9.0, kPairingMost = 0.16, kReweighting = 3.0;
-inline constexpr int kReweightings = 4;
-inline constexpr std::size_t kLeastTracks = 2, kLeastWitnesses = 3, kLeastTenths = 7;
 
 struct CameraVariance {
     double shift, scale;

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 
+#include "constants.hpp"
 #include "filters/model_constants.hpp"
 #include "math.hpp"
 
 namespace jeat::filters {
 
-inline constexpr int kGapBins = 9;
-inline constexpr std::array<double, kGapBins + 1> kGapBinEnds{0.0, 0.6, 1.2, 2.25, 3.75, 6.0, 10.5, 16.5, 27.0, 45.0};
+inline constexpr int kGapBins = static_cast<int>(kGapBinEnds.size()) - 1;
 
 struct GapCounts {
     std::array<double, kGapBins> ended{}, ended_well{};

@@ -5,14 +5,11 @@
 #include <limits>
 #include <vector>
 
+#include "constants.hpp"
 #include "filters/evidence.hpp"
 #include "math.hpp"
 
 namespace jeat::filters {
-
-inline constexpr double kLeastApart = 1e-3, kLeastSum = 1e-9, kMostLogOdds = 30.0;
-inline constexpr int kRounds = 2;
-inline constexpr double kLeastMisses = 0.2, kLeastScans = 1.0;
 
 struct SensorBelief {
     std::vector<double> p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share;

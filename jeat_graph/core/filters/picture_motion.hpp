@@ -5,11 +5,11 @@
 #include <array>
 #include <limits>
 
+#include "constants.hpp"
 #include "filters/singer.hpp"
 
 namespace jeat::filters {
 
-inline constexpr double kSpansKnown = 2.0;
 inline constexpr std::size_t kMotionNumbers = 11;
 
 // A shift (px), growth and rotation (rad) about a centre (px), or their rates (1/s).

@@ -6,13 +6,11 @@
 #include <vector>
 
 #include "association/assignment.hpp"
+#include "constants.hpp"
 #include "filters/boxes.hpp"
 #include "filters/model_constants.hpp"
 
 namespace jeat::filters {
-
-inline constexpr int kScoreBins = 47;
-inline constexpr double kFirstLogit = -4.5, kLogitStep = 0.25, kBandwidth = 0.35, kBestCount = 5.0;
 
 struct RepeatCounts {
     std::array<double, kScoreBins> boxes{}, repeated{};
@@ -75,7 +73,6 @@ struct RepeatCounts {
         }
     }
 
-    static constexpr double kLeastBoxes = 1e-9;
     double half_as_many(const ModelConstants& c) const {
         double total = 0.0;
         for (const double b : boxes) total += b;

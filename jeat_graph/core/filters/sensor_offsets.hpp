@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "constants.hpp"
 #include "filters/boxes.hpp"
 #include "filters/model_constants.hpp"
 #include "math.hpp"
@@ -41,7 +42,7 @@ struct OffsetSums {
                const ModelConstants& c) {
         double far = 0.0;
         for (int k = 0; k < 4; ++k) far = std::max(far, std::abs(d[k] - expected[k]));
-        const double share = std::min(1.0, c.offset_clip / std::max(far, 1e-12));
+        const double share = std::min(1.0, c.offset_clip / std::max(far, kLeastPrecision));
         const std::size_t at = i * sensors + j, back = j * sensors + i;
         weight[at] += share;
         weight[back] += share;
@@ -65,7 +66,7 @@ struct OffsetSums {
         }
         for (std::size_t j = 0; j < sensors; ++j) {
             const auto d = mean(i, j, c);
-            for (int k = 0; k < 4; ++k) out[k] += d[k] * (precision[j] / std::max(whole, 1e-12));
+            for (int k = 0; k < 4; ++k) out[k] += d[k] * (precision[j] / std::max(whole, kLeastPrecision));
         }
         return out;
     }

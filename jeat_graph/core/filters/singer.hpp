@@ -5,19 +5,14 @@
 #include <cmath>
 #include <cstdint>
 
+#include "constants.hpp"
 #include "filters/model_constants.hpp"
 #include "math.hpp"
 
 namespace jeat::filters {
 
-inline constexpr int kStates = 7, kPosition = 0, kVelocity = 1, kAcceleration = 2, kLogSize = 3, kGrowth = 4;
-// What lasts of a detector's error: of the position, and of ln size. States before them are those of motion.
-inline constexpr int kPositionError = 5, kSizeError = 6, kMotion = 5;
 // The state of a track: two axes; its covariance: one matrix for each, row by row.
 inline constexpr int kMean = 2 * kStates, kMatrix = kStates * kStates, kCovariance = 2 * kMatrix;
-
-// Less growth in a step has no effect.
-inline constexpr double kLeastPerspective = 1e-6;
 
 using Matrix = std::array<double, kMatrix>;
 

@@ -3,12 +3,12 @@
 
 #include <array>
 
+#include "constants.hpp"
 #include "filters/model_constants.hpp"
 #include "filters/singer.hpp"
 
 namespace jeat::filters {
 
-inline constexpr int kVisible = 0, kHidden = 1, kGone = 2, kPresences = 3;
 using PresenceTransition = std::array<double, kPresences * kPresences>;
 
 inline PresenceTransition presence_transition(double dt, const ModelConstants& c) {

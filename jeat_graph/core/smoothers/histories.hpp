@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "constants.hpp"
 #include "filters/gap_survival.hpp"
 #include "filters/singer.hpp"
 #include "interruption.hpp"
@@ -197,9 +198,8 @@ public:
 private:
     // Which share of the second lag a track waits for: of the first window as its identity says, then all of it.
     static double share_of(const History& history) {
-        constexpr double kGolden = 0.6180339887498949;
         if (history.missed >= 0.0) return 1.0;  // its first rows are out
-        const double turns = kGolden * static_cast<double>(history.track_id & 0xffff);
+        const double turns = kGolden * static_cast<double>(history.track_id & kLowBits);
         return turns - std::floor(turns);
     }
 

@@ -9,6 +9,7 @@
 
 #include "arrays.hpp"
 #include "association/heaps.hpp"
+#include "constants.hpp"
 #include "exclusive.hpp"
 #include "signals.hpp"
 #include "smoothers/histories.hpp"
@@ -24,9 +25,6 @@ using smoothers::Called;
 using Table = std::tuple<Out<double>, Out<std::int64_t>, Out2<double>, Out2<double>, Out<double>, Out<std::int64_t>,
                          Out<std::int64_t>, Out<double>>;
 using Named = nb::typed<nb::dict, nb::str, nb::object>;
-
-// After so long without any scan all tracks are over: longer predictions outgrow a double's digits (s).
-constexpr double kLongestSilenceS = 300.0;
 
 // Tracks and boxes up to which a step is no long one.
 constexpr std::size_t kFewRows = 512;

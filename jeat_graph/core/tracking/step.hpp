@@ -12,16 +12,12 @@
 #include "arrays.hpp"
 #include "association/assignment.hpp"
 #include "association/likelihood_ratio.hpp"
+#include "constants.hpp"
 #include "filters/noise_learning.hpp"
 #include "smoothers/histories.hpp"
 #include "tracking/state.hpp"
 
 namespace jeat::tracking {
-
-inline constexpr double kPeriodMemory = 0.9;
-inline constexpr double kCameraDetections = 2.0, kCameraAgeS = 0.5, kSameTimeS = 1e-6;
-// Longer ago than this is no longer told apart (s).
-inline constexpr double kLongestAgoS = 1e9;
 
 using smoothers::Record;
 
@@ -189,11 +185,11 @@ private:
         const double dt = s_.started ? t - s_.t : 0.0;
         s_.t = t;
         s_.started = true;
-        const auto ticks = static_cast<std::int64_t>(std::nearbyint(dt * 1e6));
+        const auto ticks = static_cast<std::int64_t>(std::nearbyint(dt * filters::kTicksPerS));
         if (ticks != ticks_) {
             ticks_ = ticks;
-            step_ = discretise(static_cast<double>(ticks) / 1e6, c_);
-            presence_step_ = presence_transition(static_cast<double>(ticks) / 1e6, c_);
+            step_ = discretise(static_cast<double>(ticks) / filters::kTicksPerS, c_);
+            presence_step_ = presence_transition(static_cast<double>(ticks) / filters::kTicksPerS, c_);
         }
         if (dt <= 0.0) return;
         const Densities densities(s_.process_noise, exp_of(s_.log_scene_variance()));
@@ -266,7 +262,7 @@ private:
 
     void follow_camera(const Scan& scan) {
         Tracks& tracks = s_.tracks;
-        const double rho2 = exp_of(s_.log_side_variance[scan.sensor]), dt = static_cast<double>(ticks_) / 1e6;
+        const double rho2 = exp_of(s_.log_side_variance[scan.sensor]), dt = static_cast<double>(ticks_) / filters::kTicksPerS;
         if (ticks_ <= 0) return;  // no time, no motion
         see_sure_tracks(rho2);
         const CameraMotion motion = estimate_camera(camera_tracks_, boxes_, s_.width, s_.height, dt, s_.camera, c_);
@@ -602,7 +598,7 @@ private:
     void write_predictions(Record& record, std::size_t sensor) {
         Tracks& tracks = s_.tracks;
         smoothers::Entry* const entries = record.begin_scan(tracks.size(), sensor);
-        for (std::size_t i = 0; i < tracks.size(); ++i) begin_entry(entries[i], i, static_cast<double>(ticks_) / 1e6);
+        for (std::size_t i = 0; i < tracks.size(); ++i) begin_entry(entries[i], i, static_cast<double>(ticks_) / filters::kTicksPerS);
     }
     void write_updates(Record& record, const Scan& scan) {
         Tracks& tracks = s_.tracks;

@@ -16,11 +16,11 @@ from jeat_graph.filters import gap_survival
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.histories import Existence, StepRecord
 from jeat_graph.smoothers.rows import REPORTED, Called, ModelRows, RowOutput, rows_of
-from jeat_graph.tracking.engine import Moment, Recorded, StepBoxes, StepInput, lacking
+from jeat_graph.tracking.engine import LONGEST_SILENCE_S, Moment, Recorded, StepBoxes, StepInput, lacking
 from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.paper.kalman import predict
 from jeat_graph.tracking.paper.state import MOST_LOG_SIZE, Found, PaperTracks, together
-from jeat_graph.tracking.paper.step import LONGEST_SILENCE_S, step
+from jeat_graph.tracking.paper.step import step
 from jeat_graph.tracking.record_smoothing import SmoothsRecords, histories_of
 from jeat_graph.tracking.sensor_state import SensorState
 

@@ -10,12 +10,10 @@ import numpy as np
 from jeat_graph.config.paper import PaperConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.smoothers.state_rts import FilterRecord
+from jeat_graph.tracking.engine import LONGEST_SILENCE_S
 from jeat_graph.tracking.paper.association import gated_pairs, match, second_views
 from jeat_graph.tracking.paper.kalman import born, predict, transition, update
 from jeat_graph.tracking.paper.state import Found, PaperTracks, together
-
-#: After so long without any scan all tracks are over: longer predictions outgrow a double's digits (s).
-LONGEST_SILENCE_S = 300.0
 
 
 class Stepped(NamedTuple):
