@@ -9,13 +9,21 @@ from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 
 
+def _mathml(text: str, **how: str) -> str:
+    """Convert an equation. `aligned`, which other renderers want inside $$, is `align*` for the converter."""
+    found = convert(text.replace("{aligned}", "{align*}"), **how)
+    if "<mi>&</mi>" in found:
+        raise ValueError(f"an equation has columns outside of `aligned`: {text}")
+    return found
+
+
 def _inline(translator: Any, node: nodes.math) -> None:
-    translator.body.append(convert(node.astext()))
+    translator.body.append(_mathml(node.astext()))
     raise nodes.SkipNode
 
 
 def _block(translator: Any, node: nodes.math_block) -> None:
-    translator.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    translator.body.append(f'<div class="math">{_mathml(node.astext(), display="block")}</div>')
     raise nodes.SkipNode
 
 

@@ -24,6 +24,8 @@ PAGES = [
     *sorted(p for p in (ROOT / "docs").rglob("*.md") if "_build" not in p.parts),
 ]
 GENERATED = {"commands.md"}
+#: Letters of a line of an equation beside which the page of the site, 46 em wide, has no room for more.
+WIDEST_EQUATION = 40
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -120,6 +122,24 @@ def test_configurations_that_a_page_names_are_there(page):
     there = {path.stem for path in (ROOT / "configs").glob("*.yaml")}
     strange = [one for one in named if one not in there | stand_ins and not one.endswith((".yaml", ".yml"))]
     assert strange == []
+
+
+def test_every_guide_stands_in_one_group():
+    """The groups of docs/index.md are in the order in which somebody needs the guides."""
+    listed = re.findall(
+        r"^guides/(.+)$", (ROOT / "docs" / "index.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert sorted(listed) == sorted(path.stem for path in (ROOT / "docs" / "guides").glob("*.md"))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_equations_fit_into_the_page(page):
+    """A line of an equation has so many letters at most, without marks; `aligned` has several lines."""
+    for equation in re.findall(r"\$\$(.*?)\$\$", page.read_text(encoding="utf-8"), re.DOTALL):
+        for line in equation.split(r"\\"):
+            shown = re.sub(r"\\(begin|end)\{\w+\}|\\[,;]|\\(quad|left|right|Big|big)\b|[&{}\s^_]", "", line)
+            shown = re.sub(r"\\[a-z]+", "x", shown, flags=re.IGNORECASE)
+            assert len(shown) <= WIDEST_EQUATION, line
 
 
 IN_PROSE = [
