@@ -23,6 +23,8 @@ from jeat_graph.detection.settings import USUAL_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
 
 _US_PER_S = 1e6
+#: Input of a network whose memory goes by time: what has passed since the window before (s).
+ELAPSED = "elapsed"
 
 
 class ModelEventDetector(BinnedDetector):
@@ -32,7 +34,8 @@ class ModelEventDetector(BinnedDetector):
     that `train` made is shown the camera's picture as large as its input allows; of others a picture that is
     smaller is filled up with zeros at the right and below. Further inputs are its memory: each has an
     output of the same shape, in the same order, which is given back with the next window; it begins with
-    zeros.
+    zeros. An input `elapsed` (1, 1) is told how much time has passed since the window before (s), and at the
+    first the length of the window.
 
     Args:
         path: the ONNX file.
@@ -52,7 +55,7 @@ class ModelEventDetector(BinnedDetector):
     #: Scans per second where the settings do not say.
     _usual_hz = USUAL_RATE_HZ
     #: Inputs that are neither windows nor memory.
-    _beside: tuple[str, ...] = ()
+    _beside: tuple[str, ...] = (ELAPSED,)
 
     def __init__(
         self,
@@ -84,6 +87,8 @@ class ModelEventDetector(BinnedDetector):
         super().__init__(size_px, sensor, rate_hz, ring, bins, times)
         self._by_polarity = _by_polarity(self._settings.channels, head)
         self._memory, outputs = _memory(head, self._path, self._beside)
+        self._told = next((port for port in head.inputs if port.name == ELAPSED), None)
+        self._before_s: float | None = None
         self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
         self._state: dict[str, npt.NDArray[Any]] = {}
         outputs = given_shapes(outputs, lambda: self._engine.run(self._blank(head)))
@@ -107,7 +112,7 @@ class ModelEventDetector(BinnedDetector):
         return self._outputs.note()
 
     def _emptied(self) -> None:
-        self._state = {}
+        self._state, self._before_s = {}, None
 
     def _look(self) -> Scan:
         return self._scan(self._bins.end_us / _US_PER_S, self._window(), {})
@@ -139,15 +144,24 @@ class ModelEventDetector(BinnedDetector):
 
     def _scan(self, t: float, window: npt.NDArray[Any], beside: dict[str, npt.NDArray[Any]]) -> Scan:
         """Run the network on a window that ends at t (s), and on what goes with it."""
-        inputs = {self._input.name: window, **beside}
+        inputs = {self._input.name: window, **beside, **self._elapsed(t)}
         for given, _ in self._memory:
             empty = np.zeros([side or 1 for side in given.shape], dtype=given.kind)
             inputs[given.name] = self._state.get(given.name, empty)
         outputs = self._engine.run(inputs)
+        self._before_s = t
         self._state = {given.name: outputs[returned] for given, returned in self._memory}
         found = self._outputs.read({name: outputs[name] for name in self._read})
         placed = found._replace(corners=self._places.back(found.corners))
         return scan_within(t, self.sensor, placed, self.size_px)
+
+    def _elapsed(self, t: float) -> dict[str, npt.NDArray[Any]]:
+        """Say how much has passed up to a time (s), if the network takes that."""
+        if self._told is None:
+            return {}
+        window_s = self._filled_bins * self._bins.bin_us / _US_PER_S
+        passed = window_s if self._before_s is None else max(t - self._before_s, 0.0)
+        return {self._told.name: np.full((1, 1), passed, dtype=self._told.kind)}
 
 
 def _scaled(scale: float) -> str:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
-from jeat_graph.detection.models.events import ModelEventDetector
+from jeat_graph.detection.models.events import ELAPSED, ModelEventDetector
 from jeat_graph.detection.models.feeding import picture_input
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import OnnxHead, read_onnx_head
@@ -51,7 +51,7 @@ class FusedDetector(ModelEventDetector):
     """
 
     _usual_hz = BESIDE_RATE_HZ
-    _beside = (PICTURE, GIVEN)
+    _beside = (PICTURE, GIVEN, ELAPSED)
 
     def __init__(
         self,

@@ -235,7 +235,10 @@ def _fleet(rng: np.random.Generator, fleet: FleetConfig) -> FleetConfig:
 
 
 def _traffic(rng: np.random.Generator, traffic: TrafficConfig, road: RoadConfig) -> TrafficConfig:
-    """Free flow, dense traffic or a queue; vehicles that stand on the shoulders or in a lane."""
+    """Free flow, dense traffic or a queue; vehicles that stand on the shoulders or in a lane.
+
+    In a lane stop at least as many as the scenario says: in a recording of stop-and-go somebody must.
+    """
     lanes = road.lanes_per_direction / 3.0
     flow = rng.random()
     if flow < 0.6:
@@ -253,5 +256,8 @@ def _traffic(rng: np.random.Generator, traffic: TrafficConfig, road: RoadConfig)
         headway_s=(0.6, float(rng.uniform(0.9, 1.8))),
         parked=int(rng.choice([0, 1, 2, 3, 4], p=[0.35, 0.25, 0.2, 0.1, 0.1])),
         parked_m=(near, near + float(rng.uniform(80.0, 150.0))),
-        stopped=int(rng.choice([0, 1, 2, 3, 4], p=[0.7, 0.15, 0.08, 0.04, 0.03])),
+        stopped=max(
+            int(rng.choice([0, 1, 2, 3, 4], p=[0.7, 0.15, 0.08, 0.04, 0.03])),
+            traffic.stopped,
+        ),
     )

@@ -16,7 +16,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.detection.models.feeding import letterbox_scale
 from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Picture
-from jeat_graph_sehn.training.event_samples import Sequence, draw_sequence
+from jeat_graph_sehn.training.event_samples import EventStream, Sequence, draw_stream
 from jeat_graph_sehn.training.fused_network import TOLD, SeenPictures
 from jeat_graph_sehn.training.fused_samples import FusedSequence, draw_fused
 from jeat_graph_sehn.training.learning import Target
@@ -35,21 +35,28 @@ class ShownBatch(NamedTuple):
         steps: inputs (B, C, H, W) of the windows in their order, counts as whole numbers; of pictures one.
         targets: of each step, of each of the B.
         pictures: that go with the windows of a network of both sensors, `which` and `given` step by step.
+        elapsed_s: (L, B) since the window before each (s), for a memory that goes by time.
+        goes_on: (B,) whether each goes on where the batch before ended; None: none does.
     """
 
     steps: list[Tensor]
     targets: list[list[Target]]
     pictures: SeenPictures | None = None
+    elapsed_s: Tensor | None = None
+    goes_on: Tensor | None = None
 
-    def seen(self, part: slice, device: str) -> tuple[SeenPictures, ...]:
-        """Return the pictures of some steps, as the network takes them after the windows; () without any."""
-        if self.pictures is None:
-            return ()
+    def seen(self, part: slice, device: str) -> tuple[SeenPictures | Tensor, ...]:
+        """Return what goes with the windows of some steps, as the network takes it after them."""
         size = len(self.targets[0])
         rows = slice(part.start * size, part.stop * size)
-        kept, which = torch.unique(self.pictures.which[rows], return_inverse=True)
-        shown = self.pictures.pictures[kept].to(device, memory_format=torch.channels_last)
-        return (SeenPictures(shown, which.to(device), self.pictures.given[rows].to(device)),)
+        beside: tuple[SeenPictures | Tensor, ...] = ()
+        if self.pictures is not None:
+            kept, which = torch.unique(self.pictures.which[rows], return_inverse=True)
+            shown = self.pictures.pictures[kept].to(device, memory_format=torch.channels_last)
+            beside = (SeenPictures(shown, which.to(device), self.pictures.given[rows].to(device)),)
+        if self.elapsed_s is not None:
+            beside = (*beside, self.elapsed_s[part].reshape(-1).to(device))
+        return beside
 
 
 class Batches:
@@ -77,6 +84,7 @@ class Batches:
         self._pool = ThreadPoolExecutor(1)
         self._ahead: tuple[int, Future[ShownBatch]] | None = None
         self._kept: dict[tuple[int, int], RgbImage] = {}
+        self._streams: dict[int, EventStream] = {}
         self._room_bytes = settings.kept_mb * _BYTES_PER_MB
 
     def close(self) -> None:
@@ -104,11 +112,40 @@ class Batches:
     def _make(self, step: int) -> ShownBatch:
         size = self._settings.batch
         if self._net.kind == FUSED:
-            return _joined([self._fused(step * size + k) for k in range(size)])
-        parts = [self._one(step * size + k) for k in range(size)]
-        shown = [torch.from_numpy(np.stack(arrays)) for arrays in zip(*(p[0] for p in parts), strict=True)]
-        targets = [list(step_targets) for step_targets in zip(*(p[1] for p in parts), strict=True)]
-        return ShownBatch(shown, targets)
+            return _joined([self._fused(step * size + k) for k in range(size)], self._net)
+        if isinstance(self._members[0], EventSegment):
+            return self._sequences(step)
+        parts = [self._cut_out(step * size + k) for k in range(size)]
+        return ShownBatch([torch.from_numpy(np.stack([p[0] for p in parts]))], [[p[1] for p in parts]])
+
+    def _sequences(self, step: int) -> ShownBatch:
+        """Make a batch of windows of events: parts of streams, then sequences that begin anew."""
+        settings, net = self._settings, self._net
+        size = settings.batch
+        begun = [stream_begin(step, k, settings) for k in range(size)]
+        numbers = [first * size + k for k, first in enumerate(begun)]
+        self._streams = {number: one for number, one in self._streams.items() if number in numbers}
+        parts = []
+        for k, (number, first) in enumerate(zip(numbers, begun, strict=True)):
+            if not is_streamed(k, settings):
+                parts.append(self._stream(number, 1).part(0, settings.steps, net))
+                continue
+            if number not in self._streams:
+                self._streams[number] = self._stream(number, settings.stream_steps)
+            parts.append(self._streams[number].part((step - first) * settings.steps, settings.steps, net))
+        windows = np.stack([one.windows for one in parts], axis=1)
+        return ShownBatch(
+            [torch.from_numpy(one) for one in windows],
+            [list(of_step) for of_step in zip(*(_targets(one) for one in parts), strict=True)],
+            elapsed_s=_elapsed(parts, net),
+            goes_on=torch.tensor([first < step for first in begun]) if settings.stream_share else None,
+        )
+
+    def _stream(self, number: int, times: int) -> EventStream:
+        index, rng = self._drawn(number)
+        member = self._members[index]
+        assert isinstance(member, EventSegment)
+        return draw_stream(member, rng, self._net, self._settings, self._side, times)
 
     def _drawn(self, number: int) -> tuple[int, np.random.Generator]:
         """Return the member of a cut-out or sequence, and its random numbers."""
@@ -128,12 +165,10 @@ class Batches:
 
         return draw_fused(member, rng, self._net, self._settings, picture, self._side)
 
-    def _one(self, number: int) -> tuple[list[npt.NDArray[np.generic]], list[Target]]:
+    def _cut_out(self, number: int) -> tuple[npt.NDArray[np.float32], Target]:
         index, rng = self._drawn(number)
         member = self._members[index]
-        if isinstance(member, EventSegment):
-            drawn = draw_sequence(member, rng, self._net, self._settings, self._side)
-            return list(drawn.windows), _targets(drawn)
+        assert isinstance(member, Picture)
         changes = self._settings.pictures
         frame = self._picture((index, 0), member.load)
         shares = (changes.zoom, changes.mirror_share, changes.on_box_share)
@@ -144,7 +179,7 @@ class Batches:
         # Nothing is drawn where no share is asked for: the same settings then show the same as ever.
         cluttered = changes.clutter_share > 0.0 and rng.random() < changes.clutter_share
         shown = cut_out(frame, window, rng, light, member.truth if cluttered else None)
-        return [shown], [_target(*window.boxes(member.truth))]
+        return shown, _target(*window.boxes(member.truth))
 
     def _picture(self, key: tuple[int, int], load: Callable[[], RgbImage]) -> RgbImage:
         """Return a picture; those that were read are kept as long as there is room: reading takes longest."""
@@ -157,7 +192,31 @@ class Batches:
         return frame
 
 
-def _joined(drawn: AnySequence[FusedSequence]) -> ShownBatch:
+def is_streamed(place: int, settings: TrainSettings) -> bool:
+    """Return whether a batch's sequence at a place goes on from step to step: the first ones do."""
+    return place < round(settings.stream_share * settings.batch)
+
+
+def stream_begin(step: int, place: int, settings: TrainSettings) -> int:
+    """Return at which step the sequence began that a batch has at a place.
+
+    Streams begin one after the other, so that in each step some are young and some are old.
+    """
+    if not is_streamed(place, settings):
+        return step
+    length, count = settings.stream_steps, round(settings.stream_share * settings.batch)
+    shift = place * length // count
+    return max((step + shift) // length * length - shift, 0)
+
+
+def _elapsed(parts: AnySequence[Sequence], net: NetSettings) -> Tensor | None:
+    """Return times (L, B) since the window before each (s), if the network takes them."""
+    if not net.by_time:
+        return None
+    return torch.tensor([one.elapsed_s for one in parts], dtype=torch.float32).T
+
+
+def _joined(drawn: AnySequence[FusedSequence], net: NetSettings) -> ShownBatch:
     """Put sequences side by side: step by step, as the network takes them."""
     windows = np.stack([one.events.windows for one in drawn], axis=1)
     first = np.cumsum([0, *(len(one.pictures) for one in drawn)])
@@ -168,7 +227,8 @@ def _joined(drawn: AnySequence[FusedSequence]) -> ShownBatch:
         torch.from_numpy(np.stack([one.given for one in drawn], axis=1).reshape(-1, TOLD)),
     )
     targets = [list(of_step) for of_step in zip(*(_targets(one.events) for one in drawn), strict=True)]
-    return ShownBatch([torch.from_numpy(step) for step in windows], targets, seen)
+    passed = _elapsed([one.events for one in drawn], net)
+    return ShownBatch([torch.from_numpy(step) for step in windows], targets, seen, passed)
 
 
 def _targets(drawn: Sequence) -> list[Target]:

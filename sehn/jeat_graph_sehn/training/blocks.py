@@ -59,9 +59,17 @@ class ConvGru(nn.Module):
         self.gates = nn.Conv2d(2 * channels, 2 * channels, 1)
         self.candidate = nn.Conv2d(2 * channels, channels, 1)
 
-    def forward(self, x: Tensor, state: Tensor) -> Tensor:
-        """Return the next state (B, C, H, W), which is the output as well."""
+    def forward(self, x: Tensor, state: Tensor, most: Tensor | None = None) -> Tensor:
+        """Return the next state (B, C, H, W), which is the output as well.
+
+        Args:
+            x: (B, C, H, W) features.
+            state: of the window before.
+            most: (B, C, H, W) what is left of the update gate z, 0 to 1; None: all.
+        """
         seen = state + self.near(state)
         update, reset = torch.sigmoid(self.gates(torch.cat([x, seen], dim=1))).chunk(2, dim=1)
+        if most is not None:
+            update = update * most
         fresh = torch.tanh(self.candidate(torch.cat([x, reset * seen], dim=1)))
         return state + update * (fresh - state)

@@ -2,8 +2,10 @@
 
 Output `boxes` (1, 5, N): middle and size in px of the input, and a score. Input `picture` (1, 3, H, W), red
 first, 0 to 1; or `events` (1, 2 x bins, H, W) counts and one state a level of the memory, which come back as
-outputs of the same shapes. A network of both sensors takes `events`, `picture` and `given` (1, 3): whether
-there is a picture (1 or 0), how old it is (s), and whether there are events (1 or 0).
+outputs of the same shapes. One whose memory goes by time also takes `elapsed` (1, 1): how much has passed
+since the window before (s), or what the first window spans. A network of both sensors takes `events`,
+`picture` and `given` (1, 3): whether there is a picture (1 or 0), how old it is (s), and whether there are
+events (1 or 0).
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ import torch
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.detection.models.onnx_head import CARD
 from jeat_graph.io.files.atomic import atomic_path
-from jeat_graph_sehn.training.making import SECOND_LOOK
+from jeat_graph_sehn.training.making import LASTS_S, SECOND_LOOK, lasting_of
 from jeat_graph_sehn.training.network import VehicleNet
 from jeat_graph_sehn.training.serving import ServedNet
 
@@ -77,6 +79,8 @@ def write_onnx(
     halve_weights(model)
     if second_look:
         card = {**card, SECOND_LOOK: True}
+    if lasts := lasting_of(net):
+        card = {**card, LASTS_S: lasts}
     onnx.helper.set_model_props(model, {NAMES: str({0: _CLASS}), CARD: json.dumps(card, sort_keys=True)})
     with atomic_path(path) as temporary:
         temporary.write_bytes(model.SerializeToString(deterministic=True))

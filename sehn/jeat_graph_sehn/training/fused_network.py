@@ -21,6 +21,7 @@ from jeat_graph_sehn.training.network import (
     Backbone,
     Head,
     VehicleNet,
+    elapsed_input,
     level_channels,
     remembered,
 )
@@ -126,7 +127,12 @@ class FusedNet(VehicleNet):
             part.requires_grad_(False)
 
     def forward(
-        self, x: Tensor, state: Sequence[Tensor], length: int, seen: SeenPictures
+        self,
+        x: Tensor,
+        state: Sequence[Tensor],
+        length: int,
+        seen: SeenPictures,
+        elapsed_s: Tensor | None = None,
     ) -> tuple[Tensor, tuple[Tensor, ...]]:
         """Look at windows of events with the pictures that there were; arguments as `DetectionNet.forward`.
 
@@ -135,12 +141,13 @@ class FusedNet(VehicleNet):
             state: of the windows before: that of the events, then that of both.
             length: L.
             seen: the pictures.
+            elapsed_s: (L x B,) since the window before each (s), for a memory that goes by time.
 
         Returns:
             Rows (L x B, N, 5), and the state after the last window.
         """
         count = len(self.events.states)
-        of_events, kept = self.events(x, state[:count], length)
+        of_events, kept = self.events(x, state[:count], length, elapsed_s)
         of_pictures, _ = self.pictures(seen.pictures)
         age = torch.clamp(seen.given[:, 1:2] / _AGE_S, max=_MOST_AGES)
         told = torch.cat([seen.given[:, :1], age, seen.given[:, 2:]], dim=1)
@@ -160,10 +167,12 @@ class FusedNet(VehicleNet):
             EVENTS_INPUT: torch.zeros(1, self.settings.channels, side[1], side[0]),
             PICTURE_INPUT: torch.zeros(1, COLOURS, side[1], side[0]),
             GIVEN_INPUT: torch.zeros(1, TOLD),
+            **elapsed_input(self.settings),
         }
 
     def serve(self, values: Sequence[Tensor]) -> tuple[Tensor, tuple[Tensor, ...]]:
         """Return rows and the next state of a window, a picture, and what there is."""
         window, picture, given, *state = values
+        elapsed_s = state.pop(0)[:, 0] if self.settings.by_time else None
         none = torch.zeros(0, dtype=torch.long)  # of one picture none need be chosen
-        return self(window, state, 1, SeenPictures(picture, none, given))
+        return self(window, state, 1, SeenPictures(picture, none, given), elapsed_s)

@@ -65,7 +65,7 @@ def draw_fused(
     """
     plan, events, size_px = drawn_events(segment, rng, net, settings)
     lack = _draw_lack(rng, settings.fused)
-    ends = plan.ends_us(net, settings)
+    ends = plan.ends_us(net)
     now = [plan.file_s(end) for end in ends]
     # Pictures show who stands; events do not.
     first_s, least_px = plan.file_s(0.0), settings.least_way_px

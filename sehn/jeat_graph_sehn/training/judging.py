@@ -199,7 +199,9 @@ def _windows(
             for k, window in enumerate(windows_of(own, side, shape, run.ends)):
                 now = (run.first_us + run.ends[k]) / _US
                 shown = torch.from_numpy(window[None]).float()
-                corners, scores = reader.look((shown, *_seen(net, segment, now, (side, places.shown_px))))
+                seen = _seen(net, segment, now, (side, places.shown_px))
+                passed = _elapsed(shape, run.ends, k)
+                corners, scores = reader.look((shown, *seen, *passed))
                 if k < len(run.ends) - run.judged:
                     continue
                 begin = max(run.first_us / _US, now - _SEEN_S)
@@ -209,6 +211,14 @@ def _windows(
                     else segment.truth.asked(begin, now, settings.least_way_px)
                 )
                 yield Looked(segment.source, places.back(corners), scores, truth)
+
+
+def _elapsed(shape: NetSettings, ends: Sequence[int], number: int) -> tuple[torch.Tensor, ...]:
+    """Return how much has passed since the window before (s), where the network takes that."""
+    if not shape.by_time:
+        return ()
+    passed = (ends[number] - ends[number - 1]) / _US if number else shape.bins * shape.bin_s
+    return (torch.full((1, 1), passed),)
 
 
 def _seen(

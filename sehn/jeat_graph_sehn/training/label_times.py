@@ -40,6 +40,12 @@ class LabelTimes(TruthByTime):
         """Return the boxes at `end` (s); where the camera moves, events show who stands, too."""
         return super().asked(start, end, least_px) if self._moving_only else self.at(end)
 
+    def asked_since(self, start: float, ends: list[float], least_px: float) -> list[TrueBoxes]:
+        """Return what `asked` says of each of some ends (s, ascending)."""
+        if self._moving_only:
+            return super().asked_since(start, ends, least_px)
+        return [self.at(end) for end in ends]
+
     def begin_us(self, window_us: float) -> float:
         """Return from when on sequences may be (µs): they need events before a label, and no label there."""
         return 0.0

@@ -19,12 +19,15 @@ from torch import Tensor, nn
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph_sehn.training.fused_network import FusedNet, GatedSum, silence
-from jeat_graph_sehn.training.network import DetectionNet, VehicleNet
+from jeat_graph_sehn.training.lasting import Lasting
+from jeat_graph_sehn.training.network import Backbone, DetectionNet, VehicleNet
 from jeat_graph_sehn.training.settings import COARSEST, EVENTS, FRAMES, FUSED, NetSettings
 from jeat_graph_sehn.training.widening import widen
 
 #: The card's word for a second look.
 SECOND_LOOK = "second_look"
+#: The card's word for the time constants of its states' channels (s): the file has no weights of them.
+LASTS_S = "lasts_s"
 _NOT_OURS = "is no network that `train` made"
 _SIDE = (COARSEST, COARSEST)
 _TINY = 1e-12
@@ -58,7 +61,7 @@ def new_network(settings: NetSettings, start: Sequence[Path] = ()) -> VehicleNet
             raise DataError(_unfit(found.settings, settings), path)
         given[kind] = _as_wide(found, settings.width)
     if settings.kind in given:
-        net.load_state_dict(given[settings.kind].state_dict())
+        _take(net, given[settings.kind])
     if isinstance(net, FusedNet):
         _take_parts(net, given)
     return net
@@ -133,6 +136,7 @@ def read_network(path: Path) -> VehicleNet:
             if layer.bias is not None:
                 norm.bias.copy_(layer.bias)
         _read_told(path, net)
+        _read_lasting(path, net)
     return net
 
 
@@ -149,11 +153,19 @@ def _as_wide(net: VehicleNet, width: int) -> VehicleNet:
     return wide
 
 
+def _take(net: VehicleNet | Backbone, given: VehicleNet | Backbone) -> None:
+    """Take all weights of a network. One whose memory goes by windows has none for going by time."""
+    lacking = net.load_state_dict(given.state_dict(), strict=False)
+    new = ("lasting.", "traces.")
+    if lacking.unexpected_keys or not all(any(f in name for f in new) for name in lacking.missing_keys):
+        raise ValueError(f"weights do not fit: {lacking}")  # _fits() lets none through
+
+
 def _take_parts(net: FusedNet, given: dict[str, VehicleNet]) -> None:
     """Take backbones from networks of one sensor, and the head from that of pictures if there is one."""
     frames, events = (given.get(kind) for kind in (FRAMES, EVENTS))
     if isinstance(events, DetectionNet):
-        net.events.load_state_dict(events.backbone.state_dict())
+        _take(net.events, events.backbone)
     if isinstance(frames, DetectionNet):
         net.pictures.load_state_dict(frames.backbone.state_dict())
     begins = FUSED not in given
@@ -170,10 +182,12 @@ def _take_parts(net: FusedNet, given: dict[str, VehicleNet]) -> None:
 def _fits(found: NetSettings, wanted: NetSettings) -> bool:
     kinds = (FRAMES, EVENTS, FUSED) if wanted.kind == FUSED else (wanted.kind,)
     same = wanted.width % found.width == 0 and (found.kind == FRAMES or found.bins == wanted.bins)
-    return found.kind in kinds and same
+    return found.kind in kinds and same and (wanted.by_time or not found.by_time)
 
 
 def _unfit(found: NetSettings, wanted: NetSettings) -> str:
+    if found.by_time and not wanted.by_time:
+        return "has a memory that goes by time; train with --set net.memory=time"
     return (
         f"is of {found.kind} with {found.width} channels and {found.bins} bins; to train is one of "
         f"{wanted.kind} with {wanted.width} and {wanted.bins}: its start has as many channels, a half or "
@@ -224,6 +238,21 @@ def _read_told(path: Path, net: VehicleNet) -> None:
         assert isinstance(join, GatedSum)
         weight = values[node.input[1]]
         join.told.weight.copy_(weight.reshape(join.told.weight.shape) if node.op_type == "Gemm" else weight.T)
+
+
+def lasting_of(net: VehicleNet) -> list[list[float]]:
+    """Return the time constants (s) of the channels of each state that lasts by time."""
+    found = [layer.log_hz for layer in net.modules() if isinstance(layer, Lasting)]
+    return [torch.exp(-one.detach().double()).tolist() for one in found]
+
+
+def _read_lasting(path: Path, net: VehicleNet) -> None:
+    layers = [layer for layer in net.modules() if isinstance(layer, Lasting)]
+    try:
+        for layer, times_s in zip(layers, card_of(path)[LASTS_S] if layers else [], strict=True):
+            layer.log_hz.copy_(-torch.log(torch.tensor(times_s, dtype=torch.float64)))
+    except (KeyError, TypeError, ValueError, RuntimeError):
+        raise DataError(_NOT_OURS, path) from None
 
 
 def _graph(path: Path) -> tuple[Any, dict[str, Tensor]]:

@@ -2,7 +2,7 @@
 
 A backbone of CSP blocks, a pyramid that carries what the coarse levels know to the fine ones, and one head
 for all levels. For each cell it says where the middle of a vehicle is, how large it is, and how sure that is.
-For events a memory (ConvGRU) at strides 8 and 16 keeps vehicles that have stopped.
+For events a memory (ConvGRU) at strides 8 and 16 keeps vehicles that have stopped; `lasting` says how long.
 """
 
 from __future__ import annotations
@@ -14,6 +14,15 @@ import torch
 from torch import Tensor, nn
 
 from jeat_graph_sehn.training.blocks import ConvBlock, ConvGru, CspBlock
+from jeat_graph_sehn.training.lasting import (
+    CELL_PX,
+    ELAPSED_INPUT,
+    TRACE_CHANNELS,
+    Lasting,
+    SinceThen,
+    Traces,
+    remembered_by_time,
+)
 from jeat_graph_sehn.training.settings import COARSEST, STRIDES, NetSettings
 
 #: Names of inputs.
@@ -52,27 +61,52 @@ class Backbone(nn.Module):
         self.to_16 = nn.Sequential(ConvBlock(middle, coarse, 3, 2), CspBlock(coarse, coarse, 2))
         self.states = ((middle, STRIDES[1]), (coarse, STRIDES[2])) if has_memory else ()
         self.memory = nn.ModuleList(ConvGru(channels) for channels, _ in self.states)
+        self.traces: Traces | None = None
+        self.lasting = nn.ModuleList()
+        if has_memory and settings.by_time:
+            self.lasting.extend(Lasting(channels, stride) for channels, stride in self.states)
+            self.traces = Traces(settings, fine)
+            self.states = (*self.states, (TRACE_CHANNELS, CELL_PX))
 
     def forward(
-        self, x: Tensor, state: Sequence[Tensor] = (), length: int = 1
+        self,
+        x: Tensor,
+        state: Sequence[Tensor] = (),
+        length: int = 1,
+        elapsed_s: Tensor | None = None,
     ) -> tuple[tuple[Tensor, Tensor, Tensor], tuple[Tensor, ...]]:
         """Return the features (L x B, C, H/stride, W/stride), fine to coarse, and the last state.
 
         Arguments as `DetectionNet.forward`.
         """
-        if self.states:
-            x = _cut_off(x)
+        if not self.states:
+            fine = self.to_4(self.stem(x))
+            middle = self.to_8(fine)
+            return (fine, middle, self.to_16(middle)), ()
+        x = _cut_off(x)
         fine = self.to_4(self.stem(x))
-        middle = self.to_8(fine)
-        kept: tuple[Tensor, ...] = ()
-        if self.states:
-            middle, now = remembered(self.memory[0], middle, state[0], length, self._keep)
-            kept = (now,)
-        coarse = self.to_16(middle)
-        if self.states:
-            coarse, now = remembered(self.memory[1], coarse, state[1], length, self._keep)
-            kept = (*kept, now)
-        return (fine, middle, coarse), kept
+        passed: SinceThen | None = None
+        traced: tuple[Tensor, ...] = ()
+        if self.traces is not None:
+            assert elapsed_s is not None, "a memory by time is told how much has passed"
+            activity, followed = self.traces.follow(x, state[2], length, elapsed_s)
+            fine = fine + self.traces(activity)
+            passed, traced = SinceThen(elapsed_s, activity), (followed,)
+        middle, of_middle = self._recall(0, self.to_8(fine), state, length, passed)
+        coarse, of_coarse = self._recall(1, self.to_16(middle), state, length, passed)
+        return (fine, middle, coarse), (of_middle, of_coarse, *traced)
+
+    def _recall(
+        self, level: int, x: Tensor, state: Sequence[Tensor], length: int, passed: SinceThen | None
+    ) -> tuple[Tensor, Tensor]:
+        """Let the memory of a level see features; return what it says, and its last state."""
+        memory = self.memory[level]
+        if passed is None:
+            return remembered(memory, x, state[level], length, self._keep)
+        lasting = self.lasting[level]
+        assert isinstance(memory, ConvGru)
+        assert isinstance(lasting, Lasting)
+        return remembered_by_time(memory, lasting, x, state[level], length, passed)
 
 
 class Head(nn.Module):
@@ -174,7 +208,11 @@ class DetectionNet(VehicleNet):
         self.head = Head(settings.width)
 
     def forward(
-        self, x: Tensor, state: Sequence[Tensor] = (), length: int = 1
+        self,
+        x: Tensor,
+        state: Sequence[Tensor] = (),
+        length: int = 1,
+        elapsed_s: Tensor | None = None,
     ) -> tuple[Tensor, tuple[Tensor, ...]]:
         """Look at a batch, or at windows that follow one another, of B sequences at once.
 
@@ -186,23 +224,38 @@ class DetectionNet(VehicleNet):
                 the first windows of all sequences, then the second ones.
             state: of the windows before; for a network without a memory none.
             length: L.
+            elapsed_s: (L x B,) since the window before each (s), for a memory that goes by time.
 
         Returns:
             Rows (L x B, N, 5), fine level first, row by row: middle (cells from the cell's own), size
             (logarithm, in cells) and logit; and the state after the last window.
         """
-        levels, kept = self.backbone(x, state, length)
+        levels, kept = self.backbone(x, state, length, elapsed_s)
         return self.head(levels), kept
+
+    def hold_first(self) -> None:
+        """Keep the layers up to the finest level as they are; the rest learns."""
+        for part in (self.backbone.stem, self.backbone.to_4):
+            part.requires_grad_(False)
 
     def inputs(self, side: tuple[int, int]) -> dict[str, Tensor]:
         """Return what it takes in use: one picture, or one window of events."""
         name = EVENTS_INPUT if self.settings.has_memory else PICTURE_INPUT
-        return {name: torch.zeros(1, self.settings.channels, side[1], side[0])}
+        shown = {name: torch.zeros(1, self.settings.channels, side[1], side[0])}
+        return {**shown, **elapsed_input(self.settings)}
 
     def serve(self, values: Sequence[Tensor]) -> tuple[Tensor, tuple[Tensor, ...]]:
         """Return rows and the next state of one picture or window."""
-        rows, kept = self(values[0], values[1:])
+        if self.settings.by_time:
+            rows, kept = self(values[0], values[2:], 1, values[1][:, 0])
+        else:
+            rows, kept = self(values[0], values[1:])
         return rows, kept
+
+
+def elapsed_input(settings: NetSettings) -> dict[str, Tensor]:
+    """Return the input (1, 1) that says how much time has passed, if a network takes it."""
+    return {ELAPSED_INPUT: torch.full((1, 1), settings.bins * settings.bin_s)} if settings.by_time else {}
 
 
 def level_channels(width: int) -> tuple[int, int, int]:

@@ -40,7 +40,15 @@ from jeat_graph_sehn.training.log_files import draw_log, write_log
 from jeat_graph_sehn.training.making import looks_twice, settings_of
 from jeat_graph_sehn.training.quantising import MOST_LOOKS, write_int8
 from jeat_graph_sehn.training.resizing import input_side, resized
-from jeat_graph_sehn.training.settings import COARSEST, FRAMES, FUSED, NetSettings, TrainSettings, padded
+from jeat_graph_sehn.training.settings import (
+    COARSEST,
+    EVENTS,
+    FRAMES,
+    FUSED,
+    NetSettings,
+    TrainSettings,
+    padded,
+)
 from jeat_graph_sehn.training.telling import StepsToGo, Telling
 from jeat_graph_sehn.training.trainer import Trainer, TrainingJob
 
@@ -112,6 +120,7 @@ def train(
     log, plot = request.out.with_suffix(".csv"), request.out.with_suffix(".png")
     checkpoint = request.out.with_suffix(".checkpoint")
     device = _device(request.device)
+    _check_kind(request)
     _check_fused(request)
     members = _read(request, request.data, on_read=telling.tell)
     split = _asking_far(request, split_by_segment(members, request.data))
@@ -202,6 +211,14 @@ def bring_to_int8(source: Path, request: TrainRequest, say: Callable[[str], obje
         looks = write_int8(sized, split.learned, about, request.out)
     forget_converted(_cache(request))
     return looks
+
+
+def _check_kind(request: TrainRequest) -> None:
+    """Refuse what has no meaning for a network of its kind, or without one to start from."""
+    if request.net.kind != EVENTS and request.settings.stream_share > 0.0:
+        raise ConfigError("stream_share: only networks of events learn from streams")
+    if request.settings.hold_first and (request.net.kind == FUSED or not request.start):
+        raise ConfigError("hold_first: give the network of one sensor whose layers shall stay (--start)")
 
 
 def _check_fused(request: TrainRequest) -> None:

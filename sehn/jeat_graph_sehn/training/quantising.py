@@ -27,6 +27,7 @@ from jeat_graph_sehn.training.data_sets import EventSegment, Picture
 from jeat_graph_sehn.training.event_samples import windows_of
 from jeat_graph_sehn.training.export import halve_weights, share_weights
 from jeat_graph_sehn.training.judging import LAYOUT
+from jeat_graph_sehn.training.lasting import ELAPSED_INPUT
 from jeat_graph_sehn.training.making import settings_of
 from jeat_graph_sehn.training.network import EVENTS_INPUT, PICTURE_INPUT
 from jeat_graph_sehn.training.settings import EVENTS, FUSED, NetSettings
@@ -98,7 +99,7 @@ def write_int8(source: Path, members: Sequence[Picture | EventSegment], about: o
             per_channel=True,
             activation_type=QuantType.QUInt8,
             weight_type=QuantType.QInt8,
-            nodes_to_exclude=_behind_rows(model),
+            nodes_to_exclude=[*_behind_rows(model), *(_of_states(model) if settings.by_time else ())],
             extra_options=_counts_as_they_are(model) if settings.kind == EVENTS else {},
         )
         model = onnx.load(str(small))
@@ -141,7 +142,9 @@ def _windows(
     session = onnxruntime.InferenceSession(str(network), providers=["CPUExecutionProvider"])
     names = [port.name for port in session.get_outputs()]
     later = [name for name in names if name != _BOXES]
-    state = {p.name: np.zeros([s or 1 for s in p.shape], dtype=np.float32) for p in head.inputs[1:]}
+    beside = [ELAPSED_INPUT] if settings.by_time else []
+    states = [port for port in head.inputs[1:] if port.name not in beside]
+    state = {p.name: np.zeros([s or 1 for s in p.shape], dtype=np.float32) for p in states}
     length_us = settings.bins * round(settings.bin_s * _US)
     with recording.open() as file:
         first_us = int(recording.truth.times[0] * _US) // length_us * length_us
@@ -151,7 +154,8 @@ def _windows(
     own = places.moved(EventArray.trusted(events.t_us - first_us, events.x, events.y, events.polarity))
     ends = [(k + 1) * length_us for k in range(_WINDOWS)]
     for k, window in enumerate(windows_of(own, side, settings, ends)):
-        feed = {EVENTS_INPUT: window[None].astype(np.float32), **state}
+        passed = {name: np.full((1, 1), length_us / _US, dtype=np.float32) for name in beside}
+        feed = {EVENTS_INPUT: window[None].astype(np.float32), **passed, **state}
         found = dict(zip(names, session.run(names, feed), strict=True))
         state = {one: found[name] for one, name in zip(state, later, strict=True)}
         if k % _EACH == _EACH - 1:
@@ -199,6 +203,16 @@ def _behind_rows(model: Any) -> list[str]:
             names.append(node.name)
             tensors.update(node.output)
     return names
+
+
+def _of_states(model: Any) -> list[str]:
+    """Return the names of the sums that states come of.
+
+    Rounded to 8 bits they would never be forgotten: what a number loses at a window is below half a step.
+    """
+    scopes = ("/traces/", "/memory.")
+    nodes = model.graph.node
+    return [n.name for n in nodes if n.op_type in ("Add", "Concat") and any(s in n.name for s in scopes)]
 
 
 def _cut_offs(model: Any) -> list[Any]:

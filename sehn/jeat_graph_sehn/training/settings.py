@@ -16,6 +16,8 @@ WIDTHS = {"tiny": 8, "small": 16, "medium": 32, "large": 48}
 LABEL_SETS = ("gen1", "1mpx", "etram")
 #: Channels of a picture: red, green, blue.
 COLOURS = 3
+#: What a memory's forgetting goes by.
+BY_WINDOWS, BY_TIME = "windows", "time"
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,13 @@ class NetSettings(Section):
         0.0,
         1.0,
     )
+    memory: str = choice(
+        BY_WINDOWS,
+        (BY_WINDOWS, BY_TIME),
+        "what forgetting goes by; windows: memory_keep; time: each channel of what is remembered of events "
+        "has a time constant of its own, which is learnt, changes only where events come, and leaky counts "
+        "of 0.1, 0.5 and 2 s are shown beside the bins",
+    )
 
     @property
     def channels(self) -> int:
@@ -45,6 +54,11 @@ class NetSettings(Section):
     def has_memory(self) -> bool:
         """Whether states are carried from window to window."""
         return self.kind != FRAMES
+
+    @property
+    def by_time(self) -> bool:
+        """Whether what is remembered of events lasts by time."""
+        return self.has_memory and self.memory == BY_TIME
 
 
 @dataclass(frozen=True)
@@ -83,6 +97,15 @@ class EventChanges(Section):
     drop_share: float = number(0.5, "1", "up to this share of the events is left out", 0.0, 0.99)
     time_scale: float = number(1.4, "1", "time runs slower or faster by up to this", 1.0, 4.0)
     noise_hz_px: float = number(0.2, "Hz/px", "up to so many events from nowhere are added", 0.0, 100.0)
+    swap_share: float = number(
+        0.0,
+        "1",
+        "so many have darker and brighter exchanged, as dark and bright vehicles have",
+        0.0,
+        1.0,
+    )
+    hot_pixels: int = number(0, "pixels", "up to so many pixels fire all the time", 0, 10_000)
+    lamps: int = number(0, "lamps", "up to so many lamps flicker, at 100 or 120 Hz", 0, 1000)
 
 
 @dataclass(frozen=True)
@@ -157,6 +180,11 @@ class TrainSettings(Section):
         "whether each segment of pictures is shown alike often, not each picture: worlds of many pictures, "
         "which are much alike, do not outweigh those of few",
     )
+    hold_first: bool = flag(
+        False,
+        "whether the layers up to the finest level (4 px) stay as they are in the start: a step then takes "
+        "half of the time, and what is learned is what to remember",
+    )
     second_look: bool = flag(
         False,
         "whether the finished network looks twice, the second time at half the size, for vehicles that are "
@@ -167,6 +195,15 @@ class TrainSettings(Section):
     kept_mb: float = number(2000.0, "MB", "so much of the pictures is kept in memory once it was read")
     steps: int = number(8, "1", "windows of a sequence of events", 1, 1000)
     back: int = number(4, "1", "windows through which a gradient goes back", 1, 1000)
+    stream_share: float = number(
+        0.0,
+        "1",
+        "share of a step's sequences that go on where those of the step before ended, with what is "
+        "remembered; the others begin anew",
+        0.0,
+        1.0,
+    )
+    stream_steps: int = number(8, "1", "steps for which such a one goes on", 1, 1000)
     least_step_bins: int = number(2, "bins", "shortest step from window to window (10 ms)", 1, 1000)
     most_step_bins: int = number(10, "bins", "longest (50 ms)", 1, 1000)
     least_way_px: float = number(

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import torch
+from torch import Tensor
 
 from jeat_graph.data.errors import DataError
 from jeat_graph_sehn.training.batches import Batches, ShownBatch
@@ -20,7 +21,7 @@ from jeat_graph_sehn.training.fused_network import FusedNet
 from jeat_graph_sehn.training.judging import judge
 from jeat_graph_sehn.training.learning import cost_of
 from jeat_graph_sehn.training.making import new_network
-from jeat_graph_sehn.training.network import VehicleNet, cell_places
+from jeat_graph_sehn.training.network import DetectionNet, VehicleNet, cell_places
 from jeat_graph_sehn.training.settings import BFLOAT16, NetSettings, TrainSettings
 
 _CHECKPOINT_S = 60.0
@@ -101,6 +102,8 @@ class Trainer:
         net = new_network(job.net, job.start)
         if isinstance(net, FusedNet) and settings.fused.hold_pictures:
             net.hold_pictures()
+        if isinstance(net, DetectionNet) and settings.hold_first:
+            net.hold_first()
         self.net = net.to(job.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.net).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
@@ -113,6 +116,8 @@ class Trainer:
         self._spent_s = 0.0
         self._unsettled = 1.0 - settings.settled_share
         self._sums = [0.0, 0.0, 0.0, 0.0]
+        #: What is remembered at the end of the last step, of streams that go on.
+        self._remembered: tuple[Tensor, ...] = ()
         if job.checkpoint.is_file():
             self._restore(read_checkpoint(job.checkpoint, job.identity, job.device))
 
@@ -171,7 +176,7 @@ class Trainer:
         for group in self._optimiser.param_groups:
             group["lr"] = rate
         self._optimiser.zero_grad(set_to_none=True)
-        state = self.net.empty_state(len(batch.targets[0]), settings.crop_px)
+        state = self._state_before(batch)
         count = len(batch.steps)
         for first in range(0, count, settings.back):
             part = slice(first, first + settings.back)
@@ -195,11 +200,22 @@ class Trainer:
             (cost.total * share).backward()  # type: ignore[no-untyped-call]
             for k, value in enumerate(cost):
                 self._sums[k] += float(value.detach()) * share
+        self._remembered = state if batch.goes_on is not None else ()
         torch.nn.utils.clip_grad_norm_(self.net.parameters(), settings.clip)
         self._optimiser.step()
         self.step += 1
         self._sums[3] += 1.0
         self._follow()
+
+    def _state_before(self, batch: ShownBatch) -> tuple[Tensor, ...]:
+        """Return what is remembered at the beginning of a batch: nothing, but of streams that go on."""
+        empty = self.net.empty_state(len(batch.targets[0]), self._job.settings.crop_px)
+        if batch.goes_on is None or not self._remembered:
+            return empty
+        goes_on = batch.goes_on.to(self._job.device)[:, None, None, None]
+        return tuple(
+            torch.where(goes_on, now, none) for now, none in zip(self._remembered, empty, strict=True)
+        )
 
     @torch.no_grad()
     def _follow(self) -> None:
@@ -241,6 +257,7 @@ class Trainer:
             "net": self.net.state_dict(),
             "average": self.average.state_dict(),
             "optimiser": self._optimiser.state_dict(),
+            "remembered": list(self._remembered),
         }
 
     def _restore(self, state: dict[str, Any]) -> None:
@@ -248,6 +265,7 @@ class Trainer:
             self.net.load_state_dict(state["net"])
             self.average.load_state_dict(state["average"])
             self._optimiser.load_state_dict(state["optimiser"])
+            self._remembered = tuple(state["remembered"])
             self.step, self._spent_s = int(state["step"]), float(state["spent_s"])
             self._sums = [float(value) for value in state["sums"]]
             self.log = [LogRow(int(row[0]), *(float(v) for v in row[1:])) for row in state["log"]]

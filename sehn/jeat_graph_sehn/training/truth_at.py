@@ -98,6 +98,19 @@ class TruthByTime:
         still = np.array([one not in moving for one in truth.object_id.tolist()], dtype=bool)
         return truth._replace(ignored=truth.ignored | still)
 
+    def asked_since(self, start: float, ends: list[float], least_px: float) -> list[TrueBoxes]:
+        """Return what `asked` says of each of some ends (s, ascending), in the time of the last one."""
+        ways: dict[int, float] = {}
+        before, found = start, []
+        for end in ends:
+            for one, way in self._ways(before, end).items():
+                ways[one] = ways.get(one, 0.0) + way
+            before = end
+            truth = self.at(end)
+            still = [ways.get(one, 0.0) < least_px for one in truth.object_id.tolist()]
+            found.append(truth._replace(ignored=truth.ignored | np.array(still, dtype=bool)))
+        return found
+
     def begin_us(self, window_us: float) -> float:
         """Return from when on sequences may be (µs): the first window may end at the first frame."""
         return float(self.times[0]) * _US - window_us
@@ -111,6 +124,10 @@ class TruthByTime:
 
         The way of that side of the box counts that goes farthest: what comes straight at the camera grows.
         """
+        return {one for one, way in self._ways(start, end).items() if way >= least_px}
+
+    def _ways(self, start: float, end: float) -> dict[int, float]:
+        """Return how far each has gone from `start` to `end` (s), as `moved` counts (px)."""
         first = max(int(np.searchsorted(self.times, start + _SAME_S)) - 1, 0)
         last = min(int(np.searchsorted(self.times, end - _SAME_S)), len(self.times) - 1)
         ways: dict[int, float] = {}
@@ -124,4 +141,4 @@ class TruthByTime:
             way = share * np.abs(b.corners[in_b] - a.corners[in_a]).max(axis=1)
             for one, part in zip(same.tolist(), way.tolist(), strict=True):
                 ways[one] = ways.get(one, 0.0) + part
-        return {one for one, way in ways.items() if way >= least_px}
+        return ways

@@ -12,6 +12,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
+from jeat_graph_sehn.training.lasting import Lasting
 from jeat_graph_sehn.training.network import VehicleNet
 
 #: Shares of k copies are drawn from (1 ± this) / k: copies that count alike would learn alike for long.
@@ -29,6 +30,9 @@ def widen(narrow: VehicleNet, wide: VehicleNet) -> None:
     of_narrow = dict(narrow.named_modules())
     for name, layer in wide.named_modules():
         given = of_narrow[name]
+        if isinstance(layer, Lasting):
+            assert isinstance(given, Lasting)
+            layer.log_hz.copy_(_copies(given.log_hz, len(layer.log_hz)))
         if isinstance(layer, nn.Conv2d | nn.Linear):
             assert isinstance(given, nn.Conv2d | nn.Linear)
             layer.weight.copy_(_weight(given.weight, layer.weight))

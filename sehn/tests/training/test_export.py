@@ -23,17 +23,21 @@ SIDE = (64, 32)
 ENGINES = ["opencv", "onnxruntime"]
 #: Weights in half precision: each of some twenty layers adds at most 2^-11 of what it says.
 RELATIVE, ABSOLUTE = 20 * 2.0**-11, 20 * 2.0**-11
+#: What a memory is told beside windows.
+PASSED = {"windows": [], "time": [torch.full((1, 1), 0.03)]}
 
 
-@pytest.fixture(scope="module", params=["frames", "events", "frames twice", "events twice"])
+@pytest.fixture(scope="module", params=["frames", "events", "frames twice", "events twice", "time twice"])
 def pair(request, tmp_path_factory):
     """A network whose normalisations are not those of a fresh one, and its file."""
     torch.manual_seed(4)
     kind, twice = request.param.split()[0], request.param.endswith("twice")
-    net = DetectionNet(NetSettings(kind=kind, width=6))
+    by_time = {"kind": "events", "memory": "time"}
+    net = DetectionNet(NetSettings(width=6, **(by_time if kind == "time" else {"kind": kind})))
+    passed = (1, torch.tensor([0.02, 0.05])) if kind == "time" else ()
     state = net.empty_state(2, SIDE)
     for _ in range(3):
-        _, state = net(3.0 * torch.rand(2, net.settings.channels, SIDE[1], SIDE[0]), state)
+        _, state = net(3.0 * torch.rand(2, net.settings.channels, SIDE[1], SIDE[0]), state, *passed)
         state = tuple(one.detach() for one in state)
     net.eval()
     path = tmp_path_factory.mktemp("onnx") / "net.onnx"
@@ -52,11 +56,11 @@ def test_both_engines_say_what_the_network_says(pair, engine):
     generator = torch.Generator().manual_seed(5)
     for _ in range(3):  # the memory comes back and counts
         shown = 3.0 * torch.rand(1, net.settings.channels, SIDE[1], SIDE[0], generator=generator)
-        given = [shown, *state]
+        given = [shown, *PASSED[net.settings.memory], *state]
         names = [port.name for port in head.inputs]
         found = run.run({name: value.numpy() for name, value in zip(names, given, strict=True)})
         with torch.no_grad():
-            boxes, *state = served(shown, *state)
+            boxes, *state = served(*given)
         said = [boxes, *state]
         for port, value in zip(head.outputs, said, strict=True):
             np.testing.assert_allclose(found[port.name], value.numpy(), rtol=RELATIVE, atol=ABSOLUTE)
@@ -90,7 +94,7 @@ def test_the_file_is_recognised_and_runs(pair, engine):
         scan = detector.push(EventArray(t, x, y, rng.integers(0, 2, 500).astype(np.uint8)))[0]
         assert (
             "layout yolov8, windows of 10 bins of 0.005 s by time in 64 x 32 px, "
-            f"{2 * len(served.looks)} states kept" in detector.description
+            f"{len(served.empty_state())} states kept" in detector.description
         )
     assert "classes vehicle" in detector.description
     assert len(scan.boxes) > 0

@@ -69,7 +69,7 @@ def test_sequences_end_at_labels_and_know_nothing_before(tmp_path):
     net, settings = NetSettings(kind="events", width=2), TrainSettings(crop_px=(64, 48), batch=2, steps=3)
     for seed in range(20):
         plan, _, _ = drawn_events(segment, np.random.default_rng(seed), net, settings)
-        end_s = plan.file_s(plan.ends_us(net, settings)[-1])
+        end_s = plan.file_s(plan.ends_us(net)[-1])
         assert np.abs(segment.truth.times - end_s).min() < 1e-6
     batches = Batches([segment], net, settings)
     shown = batches.get(0)

@@ -34,35 +34,44 @@ def network(tmp_path_factory):
 def written(folder, kind, twice=False):
     """A network that has seen something: its layers are not of one scale."""
     torch.manual_seed(4)
-    settings = NetSettings(kind=kind, width=6)
+    settings = NetSettings(**settings_of_kind(kind))
     net = DetectionNet(settings)
+    passed = (1, torch.tensor([0.02, 0.05])) if kind == "time" else ()
     state = net.empty_state(2, SIDE)
     for _ in range(3):
-        _, state = net(torch.rand(2, settings.channels, SIDE[1], SIDE[0]), state)
+        _, state = net(torch.rand(2, settings.channels, SIDE[1], SIDE[0]), state, *passed)
         state = tuple(one.detach() for one in state)
-    card = {"net": {"kind": kind, "width": 6}, "side": list(SIDE), "tested": {}}
+    card = {"net": settings_of_kind(kind), "side": list(SIDE), "tested": {}}
     path = folder / f"{kind}-{twice}.onnx"
     write_onnx(net.eval(), SIDE, card, path, second_look=twice)
     return path
 
 
+def settings_of_kind(kind):
+    """Settings of a network; `time` is of events, with a memory that goes by time."""
+    return {"width": 6, **({"kind": "events", "memory": "time"} if kind == "time" else {"kind": kind})}
+
+
 @pytest.mark.parametrize("twice", [False, True])
-@pytest.mark.parametrize("kind", ["frames", "events"])
+@pytest.mark.parametrize("kind", ["frames", "events", "time"])
 def test_it_says_nearly_what_the_network_said(kind, twice, network, small_set, tmp_path, capsys):
     source, out = network(kind, twice), tmp_path / "small.onnx"
-    assert main(["train", kind, str(small_set), "--int8", str(source), "--out", str(out)]) == 0
+    sensor = settings_of_kind(kind)["kind"]
+    assert main(["train", sensor, str(small_set), "--int8", str(source), "--out", str(out)]) == 0
     assert "wrote" in capsys.readouterr().out
     heads = [read_onnx_head(path) for path in (source, out)]
     assert [port.name for port in heads[1].inputs] == [port.name for port in heads[0].inputs]
-    assert heads[1].inputs[0].kind == ("uint8" if kind == "events" else "float32")
+    assert heads[1].inputs[0].kind == ("uint8" if sensor == "events" else "float32")
     engines = [
         open_engine(path, head, "onnxruntime", 1) for path, head in zip((source, out), heads, strict=True)
     ]
     rng = np.random.default_rng(1)
     shape = heads[0].inputs[0].shape
     # Sparse counts, as of events, or light that changes slowly, as in pictures.
-    shown = rng.poisson(0.1, shape) if kind == "events" else rng.random(shape)
+    shown = rng.poisson(0.1, shape) if sensor == "events" else rng.random(shape)
     states = {p.name: np.zeros(p.shape, dtype=np.float32) for p in heads[0].inputs[1:]}
+    if "elapsed" in states:
+        states["elapsed"] += 0.05
     whole, small = (
         engine.run({head.inputs[0].name: shown.astype(head.inputs[0].kind), **states})["boxes"]
         for engine, head in zip(engines, heads, strict=True)
@@ -75,9 +84,13 @@ def test_it_says_nearly_what_the_network_said(kind, twice, network, small_set, t
     scaled = {name for node in graph.node if node.op_type == "DequantizeLinear" for name in node.output}
     layers = [node for node in graph.node if node.op_type == "Conv"]
     assert sum(node.input[1] not in scaled for node in layers) == 3 * (1 + twice) < len(layers)
+    # What lasts is kept as it is: in steps of 8 bits, what is lost at a window would be nothing.
+    rounded = {node.input[0] for node in graph.node if node.op_type == "QuantizeLinear"}
+    kept = {port.name for port in graph.output} - {"boxes"}
+    assert not kept & rounded or kind != "time"
     assert all(node.input[1] not in scaled for node in layers[-1:])
     card = json.loads(heads[1].notes["card"])
-    assert card["net"] == {"kind": kind, "width": 6}
+    assert card["net"] == settings_of_kind(kind)
     assert card["int8"]["looks"] > 0
     assert card["int8"]["data"][0]["name"] == small_set.name
 

@@ -251,12 +251,12 @@ def test_events_are_learned_from_at_the_size_at_which_they_are_looked_at(small_s
     drawn = draw_sequence(segment, np.random.default_rng(5), net, settings, side)
     plan, events, size_px = drawn_events(segment, np.random.default_rng(5), net, settings)
     own_us = (events.t_us - plan.start_us).astype(np.int64)
-    kept = (own_us >= 0) & (own_us < plan.ends_us(net, settings)[-1])
+    kept = (own_us >= 0) & (own_us < plan.ends_us(net)[-1])
     own = EventArray(own_us[kept], events.x[kept], events.y[kept], events.polarity[kept])
     moved = EventPlaces(size_px, event_scale(size_px, side)).moved(own)
-    served = windows_of(moved, side, net, plan.ends_us(net, settings))
+    served = windows_of(moved, side, net, plan.ends_us(net))
     np.testing.assert_array_equal(drawn.windows, np.stack(served))
-    for corners, end in zip(drawn.corners, plan.ends_us(net, settings), strict=True):
+    for corners, end in zip(drawn.corners, plan.ends_us(net), strict=True):
         np.testing.assert_allclose(corners, times * segment.truth.at(plan.file_s(end)).corners, atol=1e-9)
 
 
