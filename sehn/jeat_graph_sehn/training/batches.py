@@ -16,7 +16,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.detection.models.feeding import letterbox_scale
 from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Picture
-from jeat_graph_sehn.training.event_samples import EventStream, Sequence, draw_stream
+from jeat_graph_sehn.training.event_samples import LongSequence, Sequence, draw_stream
 from jeat_graph_sehn.training.fused_network import TOLD, SeenPictures
 from jeat_graph_sehn.training.fused_samples import FusedSequence, draw_fused
 from jeat_graph_sehn.training.learning import Target
@@ -84,7 +84,7 @@ class Batches:
         self._pool = ThreadPoolExecutor(1)
         self._ahead: tuple[int, Future[ShownBatch]] | None = None
         self._kept: dict[tuple[int, int], RgbImage] = {}
-        self._streams: dict[int, EventStream] = {}
+        self._streams: dict[int, LongSequence] = {}
         self._room_bytes = settings.kept_mb * _BYTES_PER_MB
 
     def close(self) -> None:
@@ -141,7 +141,7 @@ class Batches:
             goes_on=torch.tensor([first < step for first in begun]) if settings.stream_share else None,
         )
 
-    def _stream(self, number: int, times: int) -> EventStream:
+    def _stream(self, number: int, times: int) -> LongSequence:
         index, rng = self._drawn(number)
         member = self._members[index]
         assert isinstance(member, EventSegment)

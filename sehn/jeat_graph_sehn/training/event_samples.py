@@ -63,7 +63,7 @@ class SequencePlan(NamedTuple):
         return [(net.bins + k * self.step_bins) * bin_us for k in range(self.windows)]
 
 
-class EventStream(NamedTuple):
+class LongSequence(NamedTuple):
     """A long sequence, of which the windows are made part by part.
 
     Attributes:
@@ -133,7 +133,7 @@ def draw_stream(
     settings: TrainSettings,
     side: tuple[int, int] | None = None,
     times: int = 1,
-) -> EventStream:
+) -> LongSequence:
     """Draw a sequence so many `times` as long as the settings' `steps`; other arguments as `draw_sequence`.
 
     Asked for is whoever has moved since it began, also where he stands now.
@@ -186,7 +186,7 @@ def cut_stream(
     plan: SequencePlan,
     window: CutOut,
     how: tuple[np.random.Generator, NetSettings, TrainSettings],
-) -> EventStream:
+) -> LongSequence:
     """Return what is seen in a cut-out.
 
     Args:
@@ -198,7 +198,7 @@ def cut_stream(
     """
     rng, net, settings = how
     own = _changed(_seen_in(events, window), plan, window, rng, settings, plan.ends_us(net)[-1])
-    return EventStream(own, [window.boxes(one) for one in truth], plan, settings.crop_px)
+    return LongSequence(own, [window.boxes(one) for one in truth], plan, settings.crop_px)
 
 
 def windows_of(
