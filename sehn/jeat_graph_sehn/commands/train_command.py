@@ -96,6 +96,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="M",
         help="train for this time in minutes instead; the result is not reproducible",
     )
+    add("--force", action="store_true", help="write the network even if it learned nothing (AP50 0)")
     add("--seed", type=natural, default=0, metavar="N", help="seed (default 0)")
     add(
         "--device",
@@ -108,7 +109,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Train, and write network, log and plot."""
+    """Train, and write network, log and plot; 1 where nothing was learned."""
     try:
         import torch
     except ImportError:
@@ -138,6 +139,14 @@ def run(args: argparse.Namespace) -> int:
             bar.update(share - bar.n)
 
         done = train(request, partial(say, "train"), on_progress)
+    if not done.files:
+        boxes = done.card["judged"]["all"]["boxes"]
+        say(
+            "train",
+            f"learned nothing, AP50 0 by {boxes} boxes; nothing is written: train longer, or begin with a "
+            "network (--start); the same command with --force writes it from the checkpoint",
+        )
+        return 1
     for name in ("judged", "tested"):
         for source, found in done.card.get(name, {}).items():
             if found["boxes"]:
@@ -182,6 +191,7 @@ def _request(args: argparse.Namespace) -> TrainRequest:
         side=args.size,
         device=args.device,
         start=_start(args.kind, args.start),
+        force=args.force,
     )
 
 

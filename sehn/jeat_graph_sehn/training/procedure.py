@@ -71,6 +71,7 @@ class TrainRequest:
         side: width and height of the network's input (px); None: the first picture's, rounded up.
         device: `auto`, `cpu` or `cuda`.
         start: networks that `train` made, which the first weights are taken from.
+        force: write also what learned nothing.
     """
 
     data: tuple[Path, ...]
@@ -82,6 +83,7 @@ class TrainRequest:
     side: tuple[int, int] | None = None
     device: str = "auto"
     start: tuple[Path, ...] = ()
+    force: bool = False
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ class Trained:
     """What came out.
 
     Attributes:
-        files: written, the network first.
+        files: written, the network first; none where nothing was learned: then the checkpoint is still there.
         card: what stands in the network's file.
     """
 
@@ -169,6 +171,8 @@ def train(
     card = {**about, "parameters": count, "steps": trainer.step, "split": split.note}
     say(f"judging by {len(split.judged)} {unit}")
     card["judged"] = _table(judge(trainer.average, split.judged, side, request.settings, _ALL, looked))
+    if card["judged"]["all"]["AP50"] == 0.0 and not request.force:
+        return Trained((), card)
     if tests:
         say(f"judging by {len(tests)} {unit} of {', '.join(path.name for path in request.tested)}")
         card["tested_on"] = [_described(path) for path in request.tested]

@@ -59,6 +59,31 @@ def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, words, said):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_what_learned_nothing_is_not_written_unless_it_is_forced(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
+    from jeat_graph_sehn.training.judging import Precision
+
+    from ..training.small_sets import write_segment
+
+    def found_nothing(*_):
+        return {"all": Precision(0.0, 0.0, 7)}
+
+    monkeypatch.setattr("jeat_graph_sehn.training.procedure.judge", found_nothing)
+    monkeypatch.setattr("jeat_graph_sehn.training.procedure.draw_log", lambda _, path: path.touch())
+    write_segment(tmp_path / "a" / "segments" / "000000", 0)
+    out = tmp_path / "out" / "n.onnx"
+    small = ["--net", "tiny", "--crop", "32x32", "--batch", "2", "--epochs", "0.2", "--threads", "1"]
+    words = ["train", "frames", str(tmp_path / "a"), "--out", str(out), *small]
+    assert main(words) == 1
+    shown = capsys.readouterr()
+    assert "learned nothing, AP50 0 by 7 boxes; nothing is written" in shown.err.splitlines()[-1]
+    assert shown.out == ""
+    assert [path.name for path in out.parent.iterdir()] == ["n.checkpoint"]
+    assert main([*words, "--force"]) == 0
+    assert "goes on from step" in capsys.readouterr().err  # to its end: there are no more steps
+    assert sorted(path.name for path in out.parent.iterdir()) == ["n.csv", "n.onnx", "n.png"]
+
+
 @pytest.mark.slow
 def test_a_training_from_the_command_line(tmp_path, capsys):
     pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
@@ -67,7 +92,19 @@ def test_a_training_from_the_command_line(tmp_path, capsys):
     for name in ("a", "b"):
         write_segment(tmp_path / name / "segments" / "000000", 0)
     out = tmp_path / "out" / "n.onnx"
-    small = ["--net", "tiny", "--crop", "32x32", "--batch", "2", "--epochs", "0.2", "--threads", "1"]
+    small = [
+        "--net",
+        "tiny",
+        "--crop",
+        "32x32",
+        "--batch",
+        "2",
+        "--epochs",
+        "0.2",
+        "--threads",
+        "1",
+        "--force",
+    ]
     assert (
         main(
             ["train", "frames", str(tmp_path / "a"), "--test", str(tmp_path / "b"), "--out", str(out), *small]

@@ -94,5 +94,5 @@ def test_what_is_judged_stays_as_the_truth_has_it(tmp_path):
     assert sum(one.truth.ignored.sum() for one in read_pictures(root)) == 2 * FRAMES
     assert sum(one.truth.ignored.sum() for one in read_pictures(root, 5.0)) == 0
     settings = TrainSettings(crop_px=(32, 32), batch=2, epochs=0.2, judged=2, far_px=5.0)
-    done = train(TrainRequest((root,), tmp_path / "n.onnx", NetSettings(width=2), settings))
+    done = train(TrainRequest((root,), tmp_path / "n.onnx", NetSettings(width=2), settings, force=True))
     assert done.card["judged"]["all"]["boxes"] == FRAMES  # of one of the two segments, one of its two boxes

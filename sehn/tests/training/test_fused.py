@@ -237,9 +237,12 @@ def test_a_training_can_start_from_its_own_result(small_set, tmp_path):
     settings = TrainSettings(
         crop_px=(32, 32), batch=2, epochs=0.1, judged=2, steps=2, back=1, learning_rate=1e-6
     )
-    first = TrainRequest((small_set,), tmp_path / "first.onnx", NET, settings)
+    first = TrainRequest((small_set,), tmp_path / "first.onnx", NET, settings, force=True)
     done = train(first)
-    again = train(TrainRequest((small_set,), tmp_path / "again.onnx", NET, settings, start=done.files[:1]))
+    request = TrainRequest(
+        (small_set,), tmp_path / "again.onnx", NET, settings, start=done.files[:1], force=True
+    )
+    again = train(request)
     assert again.card["start"][0]["name"] == "first.onnx"
     values = moment(13, (1.0, 0.0, 1.0))
     one, other = (said(read_network(done.files[0]).eval(), values) for done in (done, again))
@@ -271,7 +274,7 @@ def test_what_pictures_taught_can_be_held(small_set, tmp_path):
     assert not [name for name in changed if name.startswith(("pictures.", "head."))]
     for part in ("events.", "join."):
         assert any(name.startswith(part) for name in changed)
-    request = TrainRequest((small_set,), tmp_path / "f.onnx", NET, settings)
+    request = TrainRequest((small_set,), tmp_path / "f.onnx", NET, settings, force=True)
     with pytest.raises(ConfigError, match="hold_pictures"):
         train(request)
 

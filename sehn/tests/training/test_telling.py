@@ -59,7 +59,8 @@ def test_a_training_says_sizes_steps_and_the_time_to_go(small_set, tmp_path, mon
     settings = TrainSettings(
         crop_px=(32, 32), batch=2, epochs=0.5, minutes=minutes, judge_every=0.5, judged=2
     )
-    train(TrainRequest((small_set,), tmp_path / "n.onnx", NetSettings(width=2), settings), said.append)
+    request = TrainRequest((small_set,), tmp_path / "n.onnx", NetSettings(width=2), settings, force=True)
+    train(request, said.append)
     told = "\n".join(said)
     assert "small: 0 of 2 segments" in told
     assert "12 pictures to learn from, 12 to judge by" in told

@@ -62,7 +62,7 @@ def test_a_training_that_was_killed_writes_the_same_bytes(small_set, tmp_path, k
     )
 
     def request(out):
-        return TrainRequest((small_set,), out, NetSettings(kind=kind, width=2), settings)
+        return TrainRequest((small_set,), out, NetSettings(kind=kind, width=2), settings, force=True)
 
     class KilledError(Exception):
         """The end of a process, after a checkpoint and two more steps."""
@@ -97,7 +97,7 @@ def test_another_training_s_checkpoint_is_refused(small_set, tmp_path):
 @pytest.mark.usefixtures("no_plot")
 def test_the_file_says_what_it_was_trained_on_and_how_good_it_is(small_set, tmp_path):
     settings = TrainSettings(crop_px=(32, 32), batch=2, epochs=0.5, judged=2, seed=5)
-    done = train(TrainRequest((small_set,), tmp_path / "n.onnx", NetSettings(width=2), settings))
+    done = train(TrainRequest((small_set,), tmp_path / "n.onnx", NetSettings(width=2), settings, force=True))
     notes = read_onnx_head(tmp_path / "n.onnx").notes
     card = json.loads(notes["card"])
     assert card == json.loads(json.dumps(done.card))
@@ -114,7 +114,8 @@ def test_data_sets_are_told_apart_by_their_whole_names(small_set, tmp_path):
     for link in lights:
         link.symlink_to(small_set)
     settings = TrainSettings(crop_px=(32, 32), batch=2, epochs=0.1, judged=1)
-    done = train(TrainRequest(tuple(lights), tmp_path / "n.onnx", NetSettings(width=2), settings))
+    small = NetSettings(width=2)
+    done = train(TrainRequest(tuple(lights), tmp_path / "n.onnx", small, settings, force=True))
     assert [one["name"] for one in done.card["data"]] == ["lux-0.5", "lux-0.7"]
     twice = TrainRequest((small_set, small_set), tmp_path / "m.onnx", NetSettings(width=2), settings)
     with pytest.raises(DataError, match="2 data sets are called small"):
