@@ -79,10 +79,11 @@ def check_enough(parts: Parts, division: Division) -> None:
         and counts[0] >= LEAST_LEARNED
         and counts[1] >= LEAST_JUDGED
     )
+    whole = division.judged[1] - division.learned[0]
     if not enough:
         raise DataError(
-            f"too little to learn from: {spans[0]:.1f} s with {counts[0]} vehicles that the tracker is sure "
-            f"of, and {spans[1]:.1f} s with {counts[1]} held back; needed are {LEAST_LEARNED_S:g} s with "
-            f"{LEAST_LEARNED}, and {LEAST_JUDGED_S:g} s with {LEAST_JUDGED}: record a minute at least, in "
-            "traffic"
+            f"too little to learn from in {whole:.1f} s: {spans[0]:.1f} s with {counts[0]} vehicles that the "
+            f"tracker is sure of, and {spans[1]:.1f} s with {counts[1]} held back; needed are "
+            f"{LEAST_LEARNED_S:g} s with {LEAST_LEARNED}, and {LEAST_JUDGED_S:g} s with {LEAST_JUDGED}: "
+            "record a minute at least, in traffic"
         )

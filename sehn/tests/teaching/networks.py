@@ -17,8 +17,8 @@ FAST = {
 }
 
 
-def write_network(path, width, more=None):
-    """Write a network of events that has learned nothing yet; returns its file."""
+def write_network(path, width, more=None, kind="events"):
+    """Write a network that has learned nothing yet; returns its file."""
     import torch
 
     from jeat_graph_sehn.training.export import write_onnx
@@ -26,6 +26,6 @@ def write_network(path, width, more=None):
     from jeat_graph_sehn.training.settings import NetSettings
 
     torch.manual_seed(0)
-    settings = NetSettings(kind="events", width=width)
+    settings = NetSettings(kind=kind, width=width)
     write_onnx(new_network(settings).eval(), SIZE, {"net": asdict(settings), **(more or {})}, path)
     return path

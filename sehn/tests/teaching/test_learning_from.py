@@ -16,18 +16,19 @@ from jeat_graph_sehn.teaching.learning_from import (  # noqa: E402
     mixed,
     settings_for,
     teach,
+    write_taught,
 )
 from jeat_graph_sehn.teaching.lesson import Lesson  # noqa: E402
-from jeat_graph_sehn.teaching.recordings import open_recording  # noqa: E402
+from jeat_graph_sehn.teaching.recordings import StoredPicture, open_recording  # noqa: E402
 from jeat_graph_sehn.training.batches import Batches  # noqa: E402
-from jeat_graph_sehn.training.data_sets import EventSegment  # noqa: E402
+from jeat_graph_sehn.training.data_sets import EventSegment, Picture  # noqa: E402
 from jeat_graph_sehn.training.learning import cost_of  # noqa: E402
-from jeat_graph_sehn.training.making import new_network  # noqa: E402
+from jeat_graph_sehn.training.making import card_of, new_network, settings_of  # noqa: E402
 from jeat_graph_sehn.training.network import cell_places  # noqa: E402
 from jeat_graph_sehn.training.settings import NetSettings, TrainSettings  # noqa: E402
 from jeat_graph_sehn.training.truth_at import TruthByTime  # noqa: E402
 
-from .drawn_road import truth_of, write_events  # noqa: E402
+from .drawn_road import truth_of, write_events, write_pictures  # noqa: E402
 from .networks import FAST, write_network  # noqa: E402
 
 DIVISION = Division((0.2, 5.0), (6.0, 9.0))
@@ -55,29 +56,50 @@ def loss_on(net, members, settings):
     return float(cost_of(rows, targets, places, strides, settings.box_weight).total)
 
 
-def test_the_loss_on_what_is_held_back_falls(tmp_path, lesson):
-    write_events(tmp_path / "events.h5", 9.5)
-    start = write_network(tmp_path / "start.onnx", width=4)
-    events = open_recording(tmp_path / "events.h5", tmp_path / "cache")
+def request_of(folder, lesson, kind, start):
+    """What is taught to a small network by a drawn road's events or pictures."""
     overrides = {**FAST, "learning_rate": 0.01, "average_steps": 5.0}
-    request = TeachRequest(
+    seen = {"video": folder / "road" / "frames"}
+    if kind == "events":
+        seen = {"events": open_recording(folder / "road" / "events.h5", folder / "cache")}
+    return TeachRequest(
         lesson=lesson,
         start=start,
-        out=tmp_path / "out.onnx",
-        cache=tmp_path / "cache",
-        events=events,
+        out=folder / "out.onnx",
+        cache=folder / "cache",
         overrides=overrides,
         steps=50,
         looks=2,
+        **seen,
     )
-    taught = teach(request)
-    settings = settings_for({}, overrides, 0)
+
+
+def held_of(folder, lesson, kind):
+    """Members of the held-back part, as a training has them."""
     truth = TruthByTime(lesson.parts.judged.truth)
-    held = [EventSegment("held", "held", tmp_path / "events.h5", truth)]
+    if kind == "events":
+        return [EventSegment("held", "held", folder / "road" / "events.h5", truth)]
+    places = [(k, 0.1 * (k + 1)) for k in range(59, 89)]
+    frames = folder / "road" / "frames"
+    return [Picture("held", "held", StoredPicture(frames / f"{k:06d}.png"), truth.at(t)) for k, t in places]
+
+
+@pytest.mark.parametrize("kind", ["events", "frames"])
+def test_the_loss_on_what_is_held_back_falls(tmp_path, lesson, kind):
+    write_pictures(tmp_path / "road", 9.5)
+    write_events(tmp_path / "road" / "events.h5", 9.5)
+    start = write_network(tmp_path / "start.onnx", width=4, kind=kind)
+    request = request_of(tmp_path, lesson, kind, start)
+    taught = teach(request)
+    settings = settings_for({}, request.overrides, 0)
+    held = held_of(tmp_path, lesson, kind)
     before = loss_on(new_network(taught.net.settings, (start,)), held, settings)
     assert loss_on(taught.net, held, settings) < 0.8 * before
     assert taught.card["steps"] == 50
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["events.h5", "out.checkpoint", "start.onnx"]
+    assert not request.out.exists()
+    write_taught(taught, request)
+    assert settings_of(request.out) == taught.net.settings
+    assert card_of(request.out)["outcome"]["after"] == round(taught.outcome.after, 2)
 
 
 @pytest.mark.parametrize(("own", "old", "share"), [(1, 9, 0.3), (1, 9, 0.6), (1, 1, 0.5), (600, 180, 0.3)])
