@@ -31,7 +31,8 @@ from benchmarks.provenance import provenance
 from jeat_graph.config.argument_types import counting, natural, positive
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.eval.tables import Cell, Table
-from jeat_graph.live.transport.ends import Sink, open_sink
+from jeat_graph.live.transport.brokers.record import Sink
+from jeat_graph.live.transport.ends import open_sink
 from jeat_graph.road.camera import RoadCamera, mounted
 from jeat_graph.road.camera_file import write_camera
 

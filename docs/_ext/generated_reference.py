@@ -188,18 +188,19 @@ def _shown(value: Any) -> str:
     return f"`{value:.15g}`" if isinstance(value, float) else f"`{value}`"
 
 
-_ABOUT_RECORDS = """# Formats, exports, scores and protocols
+_ABOUT_RECORDS = """# Formats, exports, brokers, scores and protocols
 
 Made from the records in the code, one in a file of its own; `CONTRIBUTING.md` says how to add one.
 """
 
 
 def records_page() -> str:
-    """Write what is found by a record as Markdown: formats of boxes, scores, protocols."""
+    """Write what is found by a record as Markdown: formats of boxes, exports, brokers, scores, protocols."""
     from jeat_graph.eval.metrics import metrics
     from jeat_graph.eval.protocols.registry import protocols
     from jeat_graph.exporting.registry import exports
     from jeat_graph.io.formats.registry import formats
+    from jeat_graph.live.transport.brokers.registry import brokers
 
     read = [(f"`{one.name}`", one.title, one.reads, one.suffix and f"`{one.suffix}`") for one in formats()]
     scores = [
@@ -210,16 +211,26 @@ def records_page() -> str:
     ]
     sent = [(f"`{one.name}`", one.program, one.writes) for one in exports()]
     rules = [(f"`{one.name}`", one.says) for one in protocols()]
+    ends = [
+        (one.title, f"`{one.scheme}://`, {one.port}", f"`{one.scheme}+tls://`, {one.secure_port}", *options)
+        for one in brokers().values()
+        for options in [
+            [", ".join(f"`{k}`" for k in kind) for kind in (one.source_options, one.sink_options)]
+        ]
+    ]
     return "\n".join(
         [
             _ABOUT_RECORDS,
             "## Files of boxes\n",
-            "Detections, ground truth and results. Without `--input-format` a format is told by its "
-            "bytes, then by the\nend of the file's name, then by the look of its first line.\n",
+            "Detections, ground truth and results. Without `--input-format` a format is known by its "
+            "bytes, then by the\nend of the file's name, then by the form of its first line.\n",
             *_table(("format", "what", "what is read", "a run's tables"), read),
             "## Exports\n",
             "What `export --to` writes ([how](../guides/other-programs.md)).\n",
             *_table(("export", "for", "what is written"), sent),
+            "## Brokers\n",
+            "Where `stream` and `serve` take scans from and send tracks to ([how](../guides/live.md)).\n",
+            *_table(("broker", "address, port", "encrypted", "options of a source", "of a sink"), ends),
             "## Scores\n",
             *_table(("score", "unit", "meaning"), scores),
             "## Protocols\n",

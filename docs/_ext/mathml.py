@@ -11,7 +11,7 @@ from sphinx.application import Sphinx
 
 def _mathml(text: str, **how: str) -> str:
     """Convert an equation. `aligned`, which other renderers want inside $$, is `align*` for the converter."""
-    found = convert(text.replace("{aligned}", "{align*}"), **how)
+    found = str(convert(text.replace("{aligned}", "{align*}"), **how))
     if "<mi>&</mi>" in found:
         raise ValueError(f"an equation has columns outside of `aligned`: {text}")
     return found

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from jeat_graph.live.late import LiveTracker
     from jeat_graph.live.messages import ScanMessage
     from jeat_graph.live.session import Session
-    from jeat_graph.live.transport.ends import Sink, Source
+    from jeat_graph.live.transport.brokers.record import Sink, Source
 
 #: Written for hours: none of them is shared with another command.
 WRITES = ("checkpoint", "smoothed", "road", "record")

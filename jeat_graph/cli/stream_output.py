@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from jeat_graph.data.trajectories import Trajectories
     from jeat_graph.live.health import HealthChange
     from jeat_graph.live.messages import ScanMessage
-    from jeat_graph.live.transport.ends import Sink
+    from jeat_graph.live.transport.brokers.record import Sink
 
 
 class StreamOutput:

@@ -11,7 +11,7 @@ from jeat_graph.io.streams.scan_lines import read_batches
 from jeat_graph.io.streams.stream_reading import StreamReading
 from jeat_graph.live.interrupts import Interrupts
 from jeat_graph.live.messages import ScanMessage, decode_scans
-from jeat_graph.live.transport.ends import Source
+from jeat_graph.live.transport.brokers.record import Source
 
 _WAIT_S = 0.2
 

@@ -65,21 +65,27 @@ def run(copy: Path, *command: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_there_is_a_recipe_and_a_test_of_a_format_an_export_and_a_metric():
+def test_there_is_a_recipe_and_a_test_of_a_format_an_export_a_metric_and_a_broker():
     folders = [str(Path(name).parent) for name in recipes()]
-    assert {"jeat_graph/io/formats", "jeat_graph/exporting", "eval/scores"} < set(folders)
-    assert sum(folder.startswith("tests/") for folder in folders) == 3
+    own = {
+        "jeat_graph/io/formats",
+        "jeat_graph/exporting",
+        "jeat_graph/live/transport/brokers",
+        "eval/scores",
+    }
+    assert own < set(folders)
+    assert sum(folder.startswith("tests/") for folder in folders) == 4
 
 
 def test_their_tests_pass(copy):
     own = [name for name in recipes() if name.startswith("tests/")]
     done = run(copy, "pytest", "-q", "-n", "0", "-p", "no:randomly", "-p", "no:cacheprovider", *own)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    assert done.stdout.startswith("....")  # four of them, and none is left out
+    assert done.stdout.startswith("......")  # six of them, and none is left out
 
 
-def test_their_page_is_made_anew(copy):
-    """The page of the copy names the new format, export and score; nothing else had to be told of them."""
+def test_their_page_follows(copy):
+    """The page of the copy names the new format, export, score and broker; no other file had to."""
     code = (
         "import sys; sys.path.insert(0, 'docs/_ext'); import generated_reference as made; "
         "print(made.records_page())"
@@ -89,6 +95,7 @@ def test_their_page_is_made_anew(copy):
         [sys.executable, "-c", code], cwd=copy, env=environment, capture_output=True, text=True, check=True
     ).stdout
     assert all(f"| `{name}` |" in page for name in ("semicolons", "lifetimes", "crowding"))
+    assert "| Memory | `memory://`, 1 |" in page
 
 
 def test_lint_passes(copy):
@@ -118,6 +125,20 @@ def test_types_pass(copy):
         line for line in done.stdout.splitlines() if any(Path(name).name in line for name in recipes())
     ]
     shutil.rmtree(copy.parent / "cache", ignore_errors=True)
+
+
+def test_no_other_file_of_live_use_names_a_broker():
+    """A broker's scheme stands in its record, and in the modules of its client."""
+    from jeat_graph.live.transport.brokers.registry import brokers
+
+    quoted = re.compile("|".join(rf"[\"']{scheme}[\"']" for scheme in brokers()))
+    own = re.compile(rf"({'|'.join(brokers())})\w*\.py")
+    found = {
+        path.name: quoted.findall(path.read_text(encoding="utf-8"))
+        for path in (_PACKAGE / "live").rglob("*.py")
+        if not own.fullmatch(path.name)
+    }
+    assert {name: words for name, words in found.items() if words} == {}
 
 
 #: Words that are names of formats, exports, metrics or protocols and common words of this code too.

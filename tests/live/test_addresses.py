@@ -15,9 +15,9 @@ from jeat_graph.cli.main import main
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.secrets import Secret, shown_url, without_logins
 from jeat_graph.live.transport.address import parse_address
+from jeat_graph.live.transport.brokers.mqtt import BROKER as MQTT
 from jeat_graph.live.transport.ends import check_addresses, sink_address, source_address
 from jeat_graph.live.transport.names import distinct_name
-from jeat_graph.live.transport.topics import covers
 
 WRONG = [
     ("amqp://host/topic", "is no address of a broker"),
@@ -256,7 +256,7 @@ TOPICS = st.text("ab", max_size=2)
 )
 def test_what_a_subscription_of_mqtt_covers_is_what_its_client_says(levels, rest, topic):
     wanted = "/".join([*levels, "#"] if rest else levels)
-    assert covers("mqtt", wanted, "/".join(topic)) == topic_matches_sub(wanted, "/".join(topic))
+    assert MQTT.covers(wanted, "/".join(topic)) == topic_matches_sub(wanted, "/".join(topic))
 
 
 @given(st.lists(st.text(), min_size=1, max_size=3), st.lists(st.text(), min_size=1, max_size=3))

@@ -33,6 +33,7 @@ from jeat_graph.live.service.ends import check_packages
 from jeat_graph.live.service.log import Log
 from jeat_graph.live.service.status import Status
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.brokers.registry import brokers
 from jeat_graph.live.transport.ends import sink_address, source_address
 from jeat_graph.tracking.tracker import Tracker
 
@@ -225,7 +226,7 @@ def _reach(address: Address) -> None:
         link.settimeout(_BROKER_S)
         if address.tls is None:
             return
-        if address.scheme == "nats":  # encrypts after a greeting
+        if brokers()[address.scheme].greets_first:
             while not link.recv(_GREETING).endswith(b"\n"):
                 pass
         try:

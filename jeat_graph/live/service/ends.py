@@ -18,9 +18,8 @@ from jeat_graph.live.service.log import Log
 from jeat_graph.live.service.status import EndStatus, Status
 from jeat_graph.live.stdout_lines import StdoutLines
 from jeat_graph.live.transport.address import scheme_of
+from jeat_graph.live.transport.brokers.record import Sink, Source
 from jeat_graph.live.transport.ends import (
-    Sink,
-    Source,
     check_client,
     open_sink,
     open_source,

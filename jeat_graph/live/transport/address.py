@@ -13,13 +13,9 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.secrets import Secret, shown_url
 from jeat_graph.io.files.credentials import PASSWORD_FILE, login_text, password_from
 from jeat_graph.live.transport import tls
+from jeat_graph.live.transport.brokers.registry import brokers, secure_schemes
 from jeat_graph.live.transport.tls import Tls
-from jeat_graph.live.transport.topics import wrong_name, wrong_topic
 
-PORTS = {"mqtt": 1883, "nats": 4222, "kafka": 9092}
-#: Encrypted, `SCHEME+tls` (and `mqtts`, as others write it), at these ports.
-SECURE_PORTS = {"mqtt": 8883, "nats": 4222, "kafka": 9093}
-_SECURE = {**{f"{scheme}+tls": scheme for scheme in SECURE_PORTS}, "mqtts": "mqtt"}
 #: Bound of how many messages may be open: what MQTT can say.
 NUMBER_MOST = 65_535
 #: Part of a machine's name between two dots.
@@ -27,7 +23,6 @@ _LABEL = re.compile(r"(?!-)[A-Za-z0-9_-]{1,63}(?<!-)")
 _HOST_MOST = 253
 #: So much of an address is shown (characters).
 _SHOWN = 200
-_EXAMPLE = f"an address is {'|'.join(PORTS)}://[user@]host[:port]/topic"
 _Number = TypeVar("_Number", int, float)
 
 
@@ -36,7 +31,7 @@ class Address:
     """A topic of a broker; shown in any way it has neither user nor password.
 
     Attributes:
-        scheme: `mqtt`, `nats` or `kafka`.
+        scheme: of the broker.
         host: name or number of the broker's machine, that of IPv6 without brackets.
         port: its port.
         topic: topic (MQTT, Kafka) or subject (NATS).
@@ -103,13 +98,14 @@ def parse_address(url: str, known: Collection[str]) -> Address:
         ConfigError: what is wrong, and what would be right; never with what may be a password.
     """
     parts = _split(url)
-    secure = parts.scheme in _SECURE
+    secure = parts.scheme in secure_schemes()
     parts = parts._replace(scheme=scheme_of(url))
     host, port = _host(parts, url), _port(parts, url, secure)
     topic = unquote(parts.path.removeprefix("/"))
     if not topic:
-        _refuse(url, f"names no topic; {_EXAMPLE}")
-    wrong = wrong_topic(parts.scheme, topic)
+        _refuse(url, f"names no topic; {_example()}")
+    broker = brokers()[parts.scheme]
+    wrong = broker.wrong_topic(topic) if topic.isprintable() else "a topic has no control characters"
     if wrong:
         _refuse(url, f"the topic is not valid: {wrong}")
     options = _options(parts, url, (*known, *(tls.OPTIONS if secure else ())))
@@ -128,9 +124,13 @@ def parse_address(url: str, known: Collection[str]) -> Address:
 
 
 def scheme_of(url: str) -> str:
-    """Return `mqtt`, `nats` or `kafka`, encrypted or not; else what stands there."""
+    """Return the scheme of the broker, encrypted or not; else what stands there."""
     scheme = url.partition(":")[0].lower()
-    return _SECURE.get(scheme, scheme)
+    return secure_schemes().get(scheme, scheme)
+
+
+def _example() -> str:
+    return f"an address is {'|'.join(brokers())}://[user@]host[:port]/topic"
 
 
 def _refuse(url: str, why: str) -> NoReturn:
@@ -149,9 +149,9 @@ def _split(url: str) -> SplitResult:
         # MQTT's wild card is no fragment here.
         parts = urlsplit(url.replace("#", "%23"))
     except ValueError:
-        _refuse(url, f"the host is no name and no number; {_EXAMPLE}")
-    if parts.scheme not in (*PORTS, *_SECURE):
-        raise ConfigError(f"{_shown(url)!r} is no address of a broker; {_EXAMPLE}")
+        _refuse(url, f"the host is no name and no number; {_example()}")
+    if parts.scheme not in (*brokers(), *secure_schemes()):
+        raise ConfigError(f"{_shown(url)!r} is no address of a broker; {_example()}")
     if "@" in parts.path or "@" in parts.query:
         # Most likely the rest of a password; to go on would show it as a topic.
         _refuse(url, "in a topic @ is written %40, and in a password / is %2F, ? is %3F, % is %25")
@@ -161,7 +161,7 @@ def _split(url: str) -> SplitResult:
 def _host(parts: SplitResult, url: str) -> str:
     host = parts.hostname
     if not host:
-        _refuse(url, f"names no host; {_EXAMPLE}")
+        _refuse(url, f"names no host; {_example()}")
     try:
         if parts.netloc.rpartition("@")[2].startswith("["):
             ipaddress.IPv6Address(host)
@@ -170,7 +170,7 @@ def _host(parts: SplitResult, url: str) -> str:
     except ValueError:  # UnicodeError is one
         name = ""
     if not name or len(name) > _HOST_MOST or not all(_LABEL.fullmatch(part) for part in name.split(".")):
-        _refuse(url, f"the host is no name and no number; {_EXAMPLE}")
+        _refuse(url, f"the host is no name and no number; {_example()}")
     return host
 
 
@@ -180,9 +180,10 @@ def _port(parts: SplitResult, url: str, secure: bool) -> int:
     except ValueError:
         port = 0
     if port is None:
-        return (SECURE_PORTS if secure else PORTS)[parts.scheme]
+        broker = brokers()[parts.scheme]
+        return broker.secure_port if secure else broker.port
     if port == 0:
-        _refuse(url, f"the port is no number from 1 to 65535; {_EXAMPLE}")
+        _refuse(url, f"the port is no number from 1 to 65535; {_example()}")
     return port
 
 
@@ -197,7 +198,9 @@ def _options(parts: SplitResult, url: str, known: Collection[str]) -> dict[str, 
             raise ConfigError(f"unknown option {name!r} in the address; known: {names}")
         if name in options:
             _refuse(url, f"the option {name} is given twice")
-        if not value or (name not in (PASSWORD_FILE, *tls.OPTIONS) and wrong_name(parts.scheme, value)):
+        if not value or (
+            name not in (PASSWORD_FILE, *tls.OPTIONS) and not brokers()[parts.scheme].allows_name(value)
+        ):
             _refuse(url, f"the option {name} has no value that the broker takes")
         options[name] = value
     return options

@@ -4,81 +4,14 @@ from __future__ import annotations
 
 import ipaddress
 from importlib import import_module
-from typing import Protocol
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.extras import install
 from jeat_graph.live.transport.address import Address, parse_address, scheme_of
+from jeat_graph.live.transport.brokers.record import Sink, Source
+from jeat_graph.live.transport.brokers.registry import brokers
 from jeat_graph.live.transport.notices import Notices, Tell, say_nothing
 from jeat_graph.live.transport.patience import Overdue, never
-from jeat_graph.live.transport.topics import covers, has_wild_cards
-
-SOURCE_OPTIONS = {"mqtt": ("client", "most"), "nats": ("stream", "durable", "most"), "kafka": ("group",)}
-SINK_OPTIONS = {"mqtt": ("client", "most", "largest"), "nats": ("stream", "most"), "kafka": ("key", "most")}
-
-
-class Source(Protocol):
-    """Messages in the order in which the broker has them, each at least once.
-
-    What was received and not committed is delivered again after a crash or a lost connection. The broker
-    holds back what is beyond `most_open` messages, so a slow tracker is never flooded.
-
-    Attributes:
-        address: where it reads.
-        most_open: so many messages may be received and not committed; then none comes until `commit`.
-    """
-
-    address: Address
-    most_open: int
-
-    def receive(self, timeout_s: float) -> bytes | None:
-        """Wait for the next message; None if none came in that time, or the connection is being mended.
-
-        Raises:
-            JeatGraphError: no more will come: another program reads in this one's place, or the like.
-        """
-
-    def commit(self) -> None:
-        """Tell the broker that all that was received need not come again."""
-
-    def close(self) -> None:
-        """Leave; what is not committed will come again."""
-
-
-class Sink(Protocol):
-    """Takes messages; waits where the broker is slower than they come.
-
-    One that is larger than the broker takes is not sent, told of and counted: to send it again is no help.
-
-    Attributes:
-        address: where it writes.
-        too_large: messages that were not sent because of their size.
-    """
-
-    address: Address
-
-    @property
-    def too_large(self) -> int:
-        """Messages that were not sent because of their size."""
-
-    def send(self, message: bytes) -> None:
-        """Hand over a message; waits while too many are on their way.
-
-        Raises:
-            JeatGraphError: the broker refuses messages for good.
-            UnconfirmedError: the program is to end; the message was not sent.
-        """
-
-    def flush(self) -> None:
-        """Wait until the broker has confirmed all that was sent.
-
-        Raises:
-            JeatGraphError: the broker refused one of them.
-            UnconfirmedError: the program is to end, and the broker has not.
-        """
-
-    def close(self) -> None:
-        """Flush and leave; what the broker does not confirm before the program is to end is given up."""
 
 
 def source_address(url: str) -> Address:
@@ -87,7 +20,8 @@ def source_address(url: str) -> Address:
     Raises:
         ConfigError: it is not valid.
     """
-    return parse_address(url, SOURCE_OPTIONS.get(scheme_of(url), ()))
+    broker = brokers().get(scheme_of(url))
+    return parse_address(url, () if broker is None else broker.source_options)
 
 
 def sink_address(url: str) -> Address:
@@ -96,8 +30,9 @@ def sink_address(url: str) -> Address:
     Raises:
         ConfigError: it is not valid.
     """
-    address = parse_address(url, SINK_OPTIONS.get(scheme_of(url), ()))
-    if has_wild_cards(address.scheme, address.topic):
+    broker = brokers().get(scheme_of(url))
+    address = parse_address(url, () if broker is None else broker.sink_options)
+    if brokers()[address.scheme].has_wild_cards(address.topic):
         raise ConfigError(f"{address}: tracks go to one topic, without wild cards")
     return address
 
@@ -117,7 +52,7 @@ def check_addresses(source: str | None, sink: str | None) -> None:
     other = None if sink is None else sink_address(sink)
     if one is None or other is None or (one.scheme, one.server) != (other.scheme, other.server):
         return
-    if covers(one.scheme, one.topic, other.topic):
+    if brokers()[one.scheme].covers(one.topic, other.topic):
         raise ConfigError(f"{one}: the tracks that go to {other.topic!r} would come back as scans")
     client = one.options.get("client")
     if client is not None and client == other.options.get("client"):
@@ -128,15 +63,19 @@ def check_client(scheme: str) -> None:
     """See that the client of a broker is installed; connects to nobody.
 
     Args:
-        scheme: of the address: `mqtt`, `nats` or `kafka`.
+        scheme: of the address.
 
     Raises:
         ConfigError: its package is missing.
     """
+    broker = brokers()[scheme]
+    if broker.client is None:
+        return
     try:
-        import_module(f"{__package__}.{scheme}")
+        import_module(broker.client)
     except ImportError as error:
-        raise ConfigError(f"{scheme}:// needs a package more: {install(scheme)} ({error})") from None
+        how = "" if broker.extra is None else f": {install(broker.extra)}"
+        raise ConfigError(f"{scheme}:// needs a package more{how} ({error})") from None
 
 
 def open_source(
@@ -156,17 +95,7 @@ def open_source(
     """
     address = source_address(url)
     notices = _before_opening(address, notices or Notices(tell))
-    if address.scheme == "mqtt":
-        from jeat_graph.live.transport.mqtt import MqttSource
-
-        return MqttSource(address, overdue, notices)
-    if address.scheme == "nats":
-        from jeat_graph.live.transport.nats import NatsSource
-
-        return NatsSource(address, overdue, notices)
-    from jeat_graph.live.transport.kafka import KafkaSource
-
-    return KafkaSource(address, overdue, notices)
+    return brokers()[address.scheme].open_source(address, overdue, notices)
 
 
 def open_sink(
@@ -186,17 +115,7 @@ def open_sink(
     """
     address = sink_address(url)
     notices = _before_opening(address, notices or Notices(tell))
-    if address.scheme == "mqtt":
-        from jeat_graph.live.transport.mqtt import MqttSink
-
-        return MqttSink(address, overdue, notices)
-    if address.scheme == "nats":
-        from jeat_graph.live.transport.nats import NatsSink
-
-        return NatsSink(address, overdue, notices)
-    from jeat_graph.live.transport.kafka import KafkaSink
-
-    return KafkaSink(address, overdue, notices)
+    return brokers()[address.scheme].open_sink(address, overdue, notices)
 
 
 def _before_opening(address: Address, notices: Notices) -> Notices:

@@ -61,7 +61,7 @@ def _reach(client: Any, address: Address, notices: Notices) -> None:
 
 
 class KafkaSource:
-    """Messages of a topic, as a member of a group (see `ends.Source`); order holds within a partition.
+    """Messages of a topic, as a member of a group (see `record.Source`); order holds within a partition.
 
     Members of one group share the topic's partitions; one for which none is left is told so.
 
@@ -166,7 +166,7 @@ class KafkaSource:
 
 
 class KafkaSink:
-    """Produces to a topic, each message once and in order (see `ends.Sink`).
+    """Produces to a topic, each message once and in order (see `record.Sink`).
 
     All messages have one key and so come to one partition: only within a partition does order hold.
 

@@ -11,11 +11,11 @@ from typing import Any
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.brokers.registry import brokers
 from jeat_graph.live.transport.mqtt_link import PACKET_MOST, MqttLink
 from jeat_graph.live.transport.names import distinct_name
 from jeat_graph.live.transport.notices import MOST_WARNED, Notices
 from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedError, check, never
-from jeat_graph.live.transport.topics import covers
 
 #: How long the broker keeps a session without a client (s): a day, for a machine that has to be mended.
 SESSION_S = 86_400
@@ -34,7 +34,7 @@ _TOO_LARGE = 0x95
 
 
 class MqttSource:
-    """Subscription of a topic, wild cards allowed (see `ends.Source`).
+    """Subscription of a topic, wild cards allowed (see `record.Source`).
 
     The broker keeps the session of `client` (option; default from the topic) for a day, and with it what
     was published meanwhile, as much as its own `max_queued_messages` allows. It keeps what that client once
@@ -122,7 +122,7 @@ class MqttSource:
                 return None
             if session != self._session:
                 continue  # the broker sends it again by the new connection
-            if not covers("mqtt", self.address.topic, message.topic):
+            if not brokers()[self.address.scheme].covers(self.address.topic, message.topic):
                 self._pass_over(message)
                 continue
             if message.qos:
@@ -150,7 +150,7 @@ class MqttSource:
 
 
 class MqttSink:
-    """Publishes to a topic; sent again after a lost connection (see `ends.Sink`).
+    """Publishes to a topic; sent again after a lost connection (see `record.Sink`).
 
     Args:
         address: options `client`, `most` (messages on their way at a time), `largest` (bytes of a message,

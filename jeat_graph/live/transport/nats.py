@@ -37,7 +37,7 @@ _STREAM_TOO_LARGE, _ASKED_WRONGLY = 10054, range(400, 500)
 
 
 class NatsSource:
-    """Messages of a subject from its JetStream stream, in the stream's order (see `ends.Source`).
+    """Messages of a subject from its JetStream stream, in the stream's order (see `record.Source`).
 
     The consumer is called `durable` (option; the default is made of stream and subject, so that streams of
     other subjects have others). After a crash, and after a lost connection, it is made anew where it was,
@@ -179,7 +179,7 @@ class NatsSource:
 
 
 class NatsSink:
-    """Publishes to a subject that a JetStream stream keeps (see `ends.Sink`).
+    """Publishes to a subject that a JetStream stream keeps (see `record.Sink`).
 
     Args:
         address: options `stream`, `most` (messages on their way at a time).
