@@ -72,6 +72,7 @@ PUBLIC = {
     "jeat_graph.io.media.pictures",
     "jeat_graph.io.exports.prophesee_writer",
     "jeat_graph.io.tables.rounding",
+    "jeat_graph.io.tables.sensor_columns",
     "jeat_graph.io.tables.table_writer",
     "jeat_graph.io.tables.truth_io",
     "jeat_graph.io.media.video",
@@ -80,6 +81,7 @@ PUBLIC = {
     "jeat_graph.road.camera",
     "jeat_graph.road.camera_map",
     "jeat_graph.runs.demo_recording",
+    "jeat_graph.runs.latency",
     "jeat_graph.version",
 }
 

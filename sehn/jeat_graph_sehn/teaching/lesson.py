@@ -14,7 +14,9 @@ from jeat_graph import load_config, read_detections, track
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, DataError, InputWarning
+from jeat_graph.io.tables.sensor_columns import as_settings, declared_by_all
 from jeat_graph.rig.common_picture import CommonPicture, in_common
+from jeat_graph.runs.latency import at_measurement
 from jeat_graph_sehn.teaching.dividing import Division, Parts, check_enough, divide, part
 from jeat_graph_sehn.teaching.labels import TrackLabels, labels_of
 from jeat_graph_sehn.teaching.own_picture import beyond_views, in_own_picture, masking_bars
@@ -23,6 +25,7 @@ from jeat_graph_sehn.teaching.recordings import EventRecording, later_of
 #: Detections in the run directory of a raw recording.
 _DETECTIONS = "detections.csv"
 #: Identities by the whole recording; clocks as the rig says, or all the same.
+_DEFAULT = "default"
 _SETTINGS = ("smoother.identities=whole", "input.clocks=as_given")
 
 
@@ -47,7 +50,7 @@ class LessonRequest:
     data: tuple[Path, ...]
     sensor: str
     size_px: tuple[int, int]
-    config: str = "default"
+    config: str = _DEFAULT
     overrides: tuple[str, ...] = ()
     rig: Path | None = None
     teachers: tuple[str, ...] = ()
@@ -128,7 +131,10 @@ def make_lesson(request: LessonRequest, say: Callable[[str], object] = lambda _:
 
 
 def _config(request: LessonRequest) -> Config:
-    overrides = [*_SETTINGS, *request.overrides]
+    # As `track` does it: what a table says of its detectors goes with the preset that assumes nothing.
+    declared = declared_by_all([(None, _place(path)) for path in request.data])
+    told = as_settings(declared) if request.config == _DEFAULT else []
+    overrides = [*told, *_SETTINGS, *request.overrides]
     if request.rig is None and not any(one.startswith("image") for one in request.overrides):
         wide, high = request.size_px
         overrides += [f"image.width={wide}", f"image.height={high}", "input.picture=given"]
@@ -141,22 +147,24 @@ def _read(paths: Sequence[Path]) -> Detections:
     Raises:
         DataError: a directory without detections, or nothing detected at all.
     """
-    parts = []
-    for path in paths:
-        place = path / _DETECTIONS if path.is_dir() else path
-        if not place.is_file():
-            raise DataError(
-                f"holds no {_DETECTIONS}: give a file of detections, or the run directory of a raw recording "
-                "(jeat-graph track --frames … --events … --out RUN)"
-                if path.is_dir()
-                else "no such file",
-                path,
-            )
-        parts.append(read_detections(place))
-    found = Detections.concatenate(parts)
+    found = Detections.concatenate([read_detections(_place(path)) for path in paths])
     if not len(found):
         raise DataError("holds no detections; there is nothing to track", paths[0])
     return found
+
+
+def _place(path: Path) -> Path:
+    """Return the file of detections that a path means."""
+    place = path / _DETECTIONS if path.is_dir() else path
+    if not place.is_file():
+        raise DataError(
+            f"holds no {_DETECTIONS}: give a file of detections, or the run directory of a raw recording "
+            "(jeat-graph track --frames … --events … --out RUN)"
+            if path.is_dir()
+            else "no such file",
+            path,
+        )
+    return place
 
 
 def _named(teachers: tuple[str, ...], recorded: Detections) -> tuple[str, ...]:
@@ -176,7 +184,7 @@ def _labels(detections: Detections, given: Config, say: Callable[[str], object])
         warnings.simplefilter("ignore", InputWarning)  # `track` and `register` say them
         tracks = track(common, settings)
     assert tracks.smoothed is not None  # the settings ask for identities by the whole recording
-    return labels_of(tracks.smoothed, common)
+    return labels_of(tracks.smoothed, at_measurement(common, settings))
 
 
 def _later(request: LessonRequest, recorded: Detections) -> float:

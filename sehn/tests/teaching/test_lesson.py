@@ -58,10 +58,17 @@ def test_labels_are_in_the_own_picture_and_on_the_own_clock(rigged):
 
 
 def test_who_has_no_other_sensor_is_judged_by_itself_and_that_is_said(rigged, tmp_path):
-    write_detections(detections_of(("evt",), 60.0), tmp_path / "one.csv")
-    lesson = make_lesson(LessonRequest((tmp_path / "one.csv",), "evt", SIZE))
+    late = detections_of(("evt",), 60.0)
+    write_detections(replace(late, scan_t=late.scan_t + 0.05), tmp_path / "one.csv")
+    known = ("sensors.evt.latency_s=0.05",)
+    lesson = make_lesson(LessonRequest((tmp_path / "one.csv",), "evt", SIZE, overrides=known))
     assert (lesson.judges, lesson.own_judge) == (("evt",), True)
     assert "this says less than another sensor would" in lesson.described()[2]
+    # Labels are of the times at which the sensor saw, not of those at which its detector had done.
+    truth = lesson.parts.judged.truth
+    for row in np.flatnonzero(~truth.ignore)[::20]:
+        _, true = vehicles_at(truth.t[row])
+        assert np.abs(true - truth.boxes[row]).max(axis=1).min() < 1.0
 
 
 def test_sensors_and_files_that_are_not_there_are_refused(rigged, tmp_path):
