@@ -20,7 +20,7 @@ TECHNICAL = {
     "fastest_growth": "bounds a power that would grow without limit",
     "first_period_s": "stands for the period of a sensor until its second scan",
     "gap_prior_least": "keeps a prior finite in the shortest bin",
-    "learn_period_s": "how often parameters are computed anew: a question of cost",
+    "learn_period_s": "how often parameters are computed again: a question of cost",
     "unknown_score": "stands for a score that a detector does not give",
 }
 #: Constants between 0 and 1, of which a factor changes the odds.

@@ -1,6 +1,6 @@
 """`python -m benchmarks handover`: vehicles followed between cameras, on simulated roads and real highways.
 
-Simulated corridors are drawn anew from each seed; the second camera's clock is unknown. Roads that have
+Simulated corridors are drawn again from each seed; the second camera's clock is unknown. Roads that have
 nothing in common have to be refused. Real cameras: `left` and `center` of BrnoCompSpeed look at one stretch
 of road by clocks of their own; `benchmarks.handover_real` cuts their windows apart.
 """

@@ -92,7 +92,7 @@ def findings(
         short = [Path(one).name for one in dict.fromkeys(names)]
         if len(set(short)) < len(short):
             raise ConfigError(
-                f"{max(short, key=short.count)} is the name of two files: their rows could not be told apart"
+                f"{max(short, key=short.count)} is the name of two files, whose rows would be mixed"
             )
     return [
         Finding(segment, sensor, detector, settings)

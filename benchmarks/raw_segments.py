@@ -92,7 +92,9 @@ def segments_in(folders: list[Path]) -> list[RawSegment]:
     names = [folder.resolve().name for folder in folders]
     for name in names:
         if names.count(name) > 1:
-            raise DataError(f"{names.count(name)} data sets are called {name}: they could not be told apart")
+            raise DataError(
+                f"{names.count(name)} data sets are called {name}: they could not be distinguished"
+            )
     found = []
     for folder, name in zip(folders, names, strict=True):
         inner = folder / _SEGMENTS

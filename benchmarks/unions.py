@@ -1,6 +1,6 @@
 """`python -m benchmarks unions`: detectors joined, on drawn rigs: never worse than the best of them.
 
-Each recording gets a second and a third detector (`benchmarks.drawn_detectors`), drawn anew for each draw.
+Each recording gets a second and a third detector (`benchmarks.drawn_detectors`), drawn again for each draw.
 The tracker is given its own detectors and the second, its own and the third, and all, and each detector
 alone; the best alone is that with the greatest sum of MOTA, HOTA and IDF1.
 """

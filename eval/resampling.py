@@ -88,7 +88,7 @@ def predict_to(
         times: (T,) ascending (s).
         max_age_s: how far estimates may be predicted; beyond it there is no track.
         instants: (I,) all the times at which the tracker gave output, if known: at an instant without rows
-            it reported no track. Without them such an instant cannot be told from one at which the tracker
+            it reported no track. Without them such an instant cannot be known from one at which the tracker
             did not run, and earlier rows are predicted across it.
     """
     order = np.argsort(table.t, kind="stable")

@@ -147,7 +147,7 @@ def compensate(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the states (N, 2, 7) and covariances as the camera sees them after its motion.
 
-    A camera that goes on for ever and tracks that all move cannot be told apart: θ and the tracks' velocities
+    A camera that goes on for ever and tracks that all move cannot be distinguished: θ and the velocities
     could grow against each other without end. So what lasts of θ is theirs: (1 − e^(−Δ/τ)) θ/Δ goes over to
     their velocities and rates of growth, and the mean of θ over more than τ is 0.
 

@@ -5,7 +5,7 @@ Innovations of a filter whose noise is right are white with covariance S: the no
 adaptive Kalman filtering*, IEEE Trans. Automatic Control 15, 1970). Squares too large: more measurement
 noise, per sensor. Successive ones alike: the filter lags, more process noise, of the scene. Each is a step of
 stochastic approximation of a log variance. This is the paper's NIS adaptation (algorithm 1) with the two
-causes told apart.
+causes distinguished.
 """
 
 from __future__ import annotations

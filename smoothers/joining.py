@@ -42,7 +42,7 @@ _FLAT_PICTURES, _FLAT_LOG_SIZE = 4.0, 4.0
 _FREEDOM = 8.0
 _LOG_SIZE_BOUNDS = (-2.0, 12.0)
 _MOST_DISTANCE = 400.0
-# Steps are told apart by this much (s); a gap of seconds is none the worse for it.
+# Steps are distinguished by this much (s); a gap of seconds is none the worse for it.
 _STEP_S = 1e-4
 
 

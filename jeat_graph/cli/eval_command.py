@@ -200,7 +200,7 @@ def _read(args: argparse.Namespace) -> list[JudgedRun]:
     from jeat_graph.runs.beside import rate_of_truth, recorded_frames
 
     truths = args.gt * len(args.runs) if len(args.gt) == 1 else args.gt
-    # Classes that are judged by themselves are told apart frame by frame, by the rules of the protocol.
+    # Classes that are judged by themselves are distinguished frame by frame, by the rules of the protocol.
     ignoring = None if args.per_class or protocol_named(args.protocol).classes else args.classes
     runs = []
     for path, truth in with_progress(list(zip(args.runs, truths, strict=True))):

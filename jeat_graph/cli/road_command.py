@@ -156,7 +156,7 @@ def _notes(result: RoadResult) -> list[str]:
         notes.append("no lanes: the vehicles show none")
     unknown = sum(not math.isfinite(one.kmh) for one in result.speeds)
     if unknown:
-        notes.append(f"of {unknown} vehicles the speed is not known well enough to be told")
+        notes.append(f"of {unknown} vehicles the speed is not known well enough to be reported")
     if any(result.parked):
         notes.append(f"{sum(result.parked)} vehicles stood all the time (parked in speeds.csv)")
     return notes

@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set-aside-damaged",
         action="store_true",
-        help="rename a checkpoint that is damaged (FILE.damaged-1, …), warn, and begin anew, as the unit of "
+        help="rename a checkpoint that is damaged (FILE.damaged-1, …), warn, and start over, as the unit of "
         "systemd does (default: refuse it, exit code 2)",
     )
 

@@ -243,7 +243,7 @@ def _tracker(args: argparse.Namespace, config: Config) -> tuple[LiveTracker, dic
         if live.policy != args.late:
             raise ConfigError(
                 f"{args.checkpoint}: was saved with --late {live.policy}, not {args.late}; give the same, or "
-                "begin anew without the file"
+                "start over without the file"
             )
         if live.time is not None:
             _say(f"goes on from {args.checkpoint}, t = {live.time:.6g}")

@@ -23,7 +23,7 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
 
     Returns:
         The boxes (M, 4) and scores (M,) as contiguous float64 arrays that can be written: for any other kind
-        compiled code would be made anew, which takes long.
+        compiled code would be made again, which takes long.
 
     Raises:
         DataError: wrong shape, a value that is not finite, a size that is not positive, or a score

@@ -1,4 +1,4 @@
-"""Processes that work for this one: begun anew, never outliving it, and not waited for after an error.
+"""Processes that work for this one: started again, never outliving it, and not waited for after an error.
 
 A new interpreter looks for modules in the current folder first, before the one that starts it can tell it
 where else to look. There lie the user's data, and what came with them: a `signal.py` among them would be run.

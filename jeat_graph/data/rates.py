@@ -11,7 +11,7 @@ ANY_RATE_HZ = 25.0
 
 
 def median_rate_hz(*clocks: FloatArray) -> float | None:
-    """One over the median step of a clock (Hz), or None where it cannot be told.
+    """One over the median step of a clock (Hz), or None where it cannot be known.
 
     Args:
         clocks: (N,) ascending (s), of each recording of it: the steps of all are pooled. Of fewer than two

@@ -59,7 +59,7 @@ class UsualActivity:
         self._seen = 0
 
     def forget(self) -> None:
-        """Begin anew: what was usual is no longer."""
+        """Start over: what was usual is no longer."""
         self._seen = 0
 
     def standing_out(self, counts: _Counts) -> _Counts:

@@ -242,7 +242,7 @@ def _prime(
     count = max(int(np.searchsorted(source.times_s, end_s, side="right")), min(3, len(source)))
     chosen = np.unique(np.linspace(0, count - 1, min(settings.samples, count)).round().astype(int))
     if len(chosen) < 3:
-        raise DataError("has fewer than three frames: what moves cannot be told", request.frames)
+        raise DataError("has fewer than three frames: what moves cannot be seen", request.frames)
     frames = [source.frame(int(k)) for k in chosen]
     detector.prime(frames if quiet is None else [quiet.painted(frame) for frame in frames])
 

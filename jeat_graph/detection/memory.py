@@ -28,7 +28,7 @@ class CloudMemory:
 
     Args:
         link_px: gap that a cloud may have (px): pieces farther than twice that from each other stay apart,
-            and clouds that do not move apart by it within `apart_steps` are not told apart.
+            and clouds that do not move apart by it within `apart_steps` are not distinguished.
         apart_steps: steps that a cloud must have been there to be remembered as one of two, and over which
             two must move differently.
         piece_steps: steps for which the pieces of a cloud are put together after it was last whole.
@@ -62,7 +62,7 @@ class CloudMemory:
             marked: pixels, each of a cloud.
 
         Returns:
-            The number of clouds, and the pixels with the clouds numbered anew.
+            The number of clouds, and the pixels with the clouds renumbered.
         """
         self._broken_now = np.zeros_like(self._broken)
         old = np.flatnonzero(self._age >= self._apart_steps)

@@ -51,7 +51,7 @@ class NoiseSettings(Section):
         8.0, "1", "a hot pixel fires so many times as often as those around it; an edge fires in all", 1.0
     )
     period_s: float = number(
-        1.0, "s", "over which the rate of a pixel is taken; hot pixels are looked for anew after each", 0.01
+        1.0, "s", "over which the rate of a pixel is taken; hot pixels are looked for again after each", 0.01
     )
 
 

@@ -23,7 +23,7 @@ class Arrival(NamedTuple):
         repeated: those that had been taken before a checkpoint from which the tracker went on.
         held: those that wait, because their time is far from all others (`live.jump_s`).
         refuted: earlier ones that waited and are passed over now.
-        reset: whether time has begun anew, because all scans were too late for long: all tracks have ended.
+        reset: whether time has started over, because all scans were too late for long: all tracks have ended.
         leapt: whether time goes on much later, because scans ahead of time confirmed each other.
         taken: the scans that were taken, those that had waited too; times without the sensors' latency.
         waiting: those that wait for a sensor whose scans come later (`live.wait_s`).

@@ -29,7 +29,7 @@ def count_lines(counts: Counts, restarts: Mapping[str, int]) -> list[str]:
 
     Args:
         counts: how often.
-        restarts: by source, how often it began to count its messages anew.
+        restarts: by source, how often it restarted its count of messages.
     """
     lines = []
     if counts.bad:
@@ -44,5 +44,5 @@ def count_lines(counts: Counts, restarts: Mapping[str, int]) -> list[str]:
         lines.append(f"{counts.forgotten} sources were forgotten: only the last are known by their numbers")
     for source, count in restarts.items():
         often = "once" if count == 1 else f"{count} times"
-        lines.append(f"source {source!r} began to count its messages anew {often}")
+        lines.append(f"source {source!r} restarted its count of messages {often}")
     return lines

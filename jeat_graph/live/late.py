@@ -273,7 +273,7 @@ class LiveTracker(OneAtATime):
             raise
 
     def _decide(self, batch: list[Scan]) -> Decision:
-        """Decide what becomes of scans that have not come before, and let time begin anew where it must."""
+        """Decide what becomes of scans that have not come before, and let time start over where it must."""
         now, t = self.tracker.time, max(scan.t for scan in batch)
         if self._repetition.first is None:
             self._repetition.first = t

@@ -83,4 +83,4 @@ def _known(out: Path, origin: dict[str, Any]) -> DetectedFile | None:
         size = None if image is None else (int(image[0]), int(image[1]))
         return DetectedFile(str(file), size, tuple(map(str, known["detectors"])))
     except (ValueError, KeyError, TypeError, RecursionError):
-        return None  # damaged: it is made anew
+        return None  # damaged: it is made again

@@ -30,7 +30,7 @@ def known_vehicles(run: Path, camera_file: str) -> int | None:
         known = json.loads(source.read_text(encoding="utf-8"))
         return int(known["vehicles"]) if known | _origin(run, camera_file) == known else None
     except (ValueError, KeyError, TypeError, RecursionError):
-        return None  # damaged: it is made anew
+        return None  # damaged: it is made again
 
 
 def drive_on_road(run: Path, camera_file: str) -> int:

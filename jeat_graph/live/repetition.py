@@ -27,7 +27,7 @@ class Repetition:
 
     Attributes:
         until: after a restart, time of the newest scan that was known then (s); None once a new one has come.
-        first: time of the first scan since time has begun anew (s).
+        first: time of the first scan since time has started over (s).
     """
 
     def __init__(self, base: TimeBase, whole: bool) -> None:

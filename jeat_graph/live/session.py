@@ -57,7 +57,7 @@ class RowsEnd(Protocol):
         """Add rows."""
 
     def flush(self) -> int:
-        """Begin anew elsewhere if that is due; how much there is by now, which a checkpoint keeps."""
+        """Start over elsewhere if that is due; how much there is by now, which a checkpoint keeps."""
 
 
 @dataclass

@@ -38,8 +38,8 @@ class SessionWarnings:
         self._restarts += 1
         self._first(
             self._restarts,
-            f"{place}source {message.source!r} counts anew from seq {message.seq}, with another time: it was "
-            "started again, and its messages are taken",
+            f"{place}source {message.source!r} restarts its count at seq {message.seq}, with another time: "
+            "it was started again, and its messages are taken",
         )
 
     def again(self, message: ScanMessage, place: str) -> None:

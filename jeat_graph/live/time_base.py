@@ -70,7 +70,7 @@ class Decision(NamedTuple):
         take: scans to be taken now, those that waited first.
         refuted: scans that waited and are passed over.
         leapt: whether a row ahead was believed: time goes on there.
-        reset: whether a row behind was believed: time begins anew there.
+        reset: whether a row behind was believed: time starts over there.
     """
 
     take: list[Scan]

@@ -78,7 +78,7 @@ class Pattern(NamedTuple):
                 f"staggered-circles:4x11 or charuco:8x6:4X4_50 (squares, markers), not {text!r}"
             )
         if kind in (CHECKERBOARD, CIRCLES) and columns == rows:
-            raise DataError(f"{text}: a pattern with as many columns as rows looks alike from four sides")
+            raise DataError(f"{text}: a pattern with as many columns as rows looks the same from four sides")
         found = Pattern(kind, int(columns), int(rows), dictionary or _DICTIONARY)
         if kind == CHARUCO:
             found.board()

@@ -68,7 +68,7 @@ def calibrate(problem: Problem, zone: str = "") -> CameraCalibration:
     """
     if problem.known is not None:
         if problem.points is not None:
-            raise DataError("surveyed points make a camera anew: leave them out, or the camera")
+            raise DataError("surveyed points make a new camera: leave them out, or the camera")
         if not len(problem.free()):
             raise DataError("the camera has no covariance: it counts as exact, and nothing can sharpen it")
         return _solve(problem)

@@ -28,7 +28,7 @@ COMPARED_S = 90.0
 # Sensors contradict each other where each sees so many vehicles drive, most of them where the other one sees
 # some, and their boxes agree at no difference of the clocks.
 _MANY, _SAME_PLACES, _NEVER = 10, 0.6, 0.08
-# Places are told apart by so many columns and rows.
+# Places are distinguished by so many columns and rows.
 _PLACES = 24
 
 

@@ -90,7 +90,7 @@ def load_state(path: str | Path, config: Config | None = None) -> tuple[Config, 
     if kind != _MAGIC or form != FORMAT or version != __version__:
         raise JeatGraphError(
             f"{path}: was saved by version {version} (format {form}), and this is {__version__} (format "
-            f"{FORMAT}): finish with that version, or begin anew without the file"
+            f"{FORMAT}): finish with that version, or start over without the file"
         )
     if not isinstance(settings, dict):
         raise DataError(f"is no {_WHAT}: its settings are none", path)
@@ -101,7 +101,7 @@ def load_state(path: str | Path, config: Config | None = None) -> tuple[Config, 
         if wanted != settings:
             raise JeatGraphError(
                 f"{path}: was saved with other settings: {_difference(settings, wanted)}; give the same, or "
-                "begin anew without the file"
+                "start over without the file"
             )
     with refusing_damage(path):
         kept = config_from_dict(settings)

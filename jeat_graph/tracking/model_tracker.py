@@ -433,7 +433,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
 
     def _check_diagnostics(self) -> None:
         if not self._diagnostics:
-            raise JeatGraphError("make the tracker with diagnostics=True to be told of its updates")
+            raise JeatGraphError("make the tracker with diagnostics=True for its updates")
 
     def _declare(self, batch: Sequence[Scan]) -> None:
         """Make the sensors of first scans known."""

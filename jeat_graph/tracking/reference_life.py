@@ -18,7 +18,7 @@ from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks,
 # Two times that differ by less are one (s).
 _SAME_TIME_S = 1e-6
 _LEAST_AREA = 1e-9
-# Longer ago than this is no longer told apart (s).
+# Longer ago than this is no longer distinguished (s).
 _LONGEST_AGO_S = 1e9
 
 

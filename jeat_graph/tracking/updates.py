@@ -58,7 +58,7 @@ class Updates:
             format: what boxes of an array are: `ltwh` (left, top, width, height; so they are taken without
                 it), `xyxy` (left, top, right, bottom), or `xywh` (centre, width, height).
 
-        Returns and raises as `step`; also a DataError where it cannot be told what `source` is.
+        Returns and raises as `step`; also a DataError where it cannot be known what `source` is.
         """
         found = boxes_of(source, scores, classes, format)
         vectors = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]

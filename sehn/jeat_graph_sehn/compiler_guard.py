@@ -3,7 +3,7 @@
 The compiler (numba) reads settings from the current folder, where the user's data lie, and one of them says
 where machine code is kept; and it runs what it finds there, whoever wrote it. What is empty, cut off or
 garbage there would end the program. So settings come from the environment alone, a file that others could
-have written is as good as none, and what cannot be read is compiled anew.
+have written is as good as none, and what cannot be read is compiled again.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def _guard(caching: ModuleType) -> None:
         try:
             return load_data(cache, name)
         except Exception as error:
-            raise OSError(f"{path}: is damaged: {error}") from None  # it is compiled anew
+            raise OSError(f"{path}: is damaged: {error}") from None  # it is compiled again
 
     index.guarded = True  # type: ignore[attr-defined]
     file._load_index, file._load_data = index, data

@@ -2,7 +2,7 @@
 
 The compiler keeps its machine code beside the sources, or in the user's cache. A container may have neither:
 an installation that cannot be written, and no home. Then the code is kept in a private folder for temporary
-files, and where there is none of those either, it is compiled anew in each run.
+files, and where there is none of those either, it is compiled again in each run.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def choose_cache() -> None:
         notice = f"neither the installation nor a home can be written: compiled code is kept in {temporary}"
         drop_stale(_PACKAGE, temporary)
         return
-    notice = "no folder can be written: the renderer is compiled anew in each run; set NUMBA_CACHE_DIR"
+    notice = "no folder can be written: the renderer is compiled again in each run; set NUMBA_CACHE_DIR"
     _compile_without_cache()
 
 

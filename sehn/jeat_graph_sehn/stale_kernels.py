@@ -3,7 +3,7 @@
 The compiler notices that a kernel's own file has changed, but not that a file has whose functions, types or
 constants went into the kernel: after an update it would go on with old machine code, or stumble over types
 that are no more. So the sizes and times of all sources are kept beside the compiled code; where one differs,
-the code of that file and of every file that imports it, directly or through others, is compiled anew.
+the code of that file and of every file that imports it, directly or through others, is compiled again.
 """
 
 from __future__ import annotations

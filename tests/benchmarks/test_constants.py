@@ -164,7 +164,7 @@ def test_a_page_names_its_command_without_the_folder_and_can_be_made_again(tmp_p
     ("words", "said"),
     [
         (["--only", "jerks"], "--only jerks is no constant that is moved; the nearest is jerk"),
-        (["--only", "learn_period_s"], "how often parameters are computed anew"),
+        (["--only", "learn_period_s"], "how often parameters are computed again"),
         (["--steps", "1", "2"], "--steps 1 moves nothing"),
         (["--sets", "one"], "leaving one out takes two or more"),
     ],

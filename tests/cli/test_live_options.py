@@ -1,4 +1,4 @@
-"""Cameras that are on and files are told apart, and what says nothing of one of them is refused."""
+"""Cameras that are on and files are distinguished, and what says nothing of one of them is refused."""
 
 from __future__ import annotations
 

@@ -362,7 +362,7 @@ def test_a_checkpoint_goes_on_with_the_same_answer_to_late_scans_or_not_at_all(m
     assert (code, len(out.splitlines())) == (0, 1)
     code, out, err = stream(line(1.1), monkeypatch, capsys, *options, "refuse")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "was saved with --late skip, not refuse; give the same, or begin anew without the file" in err
+    assert "was saved with --late skip, not refuse; give the same, or start over without the file" in err
     code, out, _ = stream(line(1.0) + line(1.1), monkeypatch, capsys, *options, "skip")
     assert (code, json.loads(out)["t"]) == (0, 1.1)
 

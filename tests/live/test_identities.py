@@ -166,7 +166,7 @@ def test_the_rows_of_a_moment_are_by_identity():
     names = Identities(np.zeros(0, dtype=np.int64), 1)
     one, none = np.array([1, 2]), np.array([0, 0])
     known = names.follow(1, 3, [one], [none])
-    # A scan before them: its track is new, and theirs are numbered anew.
+    # A scan before them: its track is new, and theirs are renumbered.
     known = names.follow(1, 4, [np.array([1]), np.array([3, 2])], [np.array([0]), *known])
     np.testing.assert_array_equal(names.of(np.array([1, 2, 3])), [3, 2, 1])
     assert [one.tolist() for one in known] == [[3], [1, 2]]

@@ -359,7 +359,7 @@ def test_a_damaged_checkpoint_is_refused_unless_it_is_to_be_set_aside(tmp_path, 
     )
     assert main(["serve", str(path)]) == 2
     (said,) = capsys.readouterr().err.splitlines()
-    assert re.search(r"state\.npz: is .*; or let --set-aside-damaged rename it and begin anew$", said)
+    assert re.search(r"state\.npz: is .*; or let --set-aside-damaged rename it and start over$", said)
     assert (tmp_path / "state.npz").read_bytes() == content
     assert [file.name for file in tmp_path.glob("state*")] == ["state.npz"]
 
@@ -380,7 +380,7 @@ def test_a_damaged_checkpoint_is_set_aside_and_told_of(tmp_path):
     finally:
         service.process.kill()
     aside = tmp_path / "state.npz.damaged-2"
-    assert why.endswith(f"; it is {aside} now, and the tracker begins anew: tracks get new identities")
+    assert why.endswith(f"; it is {aside} now, and the tracker starts over: tracks get new identities")
     [line] = [line for line in service.lines if "damaged-2" in line["text"]]
     assert (line["level"], line["text"]) == ("warning", why)
     assert aside.read_bytes() == content
@@ -431,7 +431,7 @@ def test_smoothed_rows_of_a_run_that_is_not_gone_on_from_are_set_aside(tmp_path,
         assert rows.read_text() == csv_header(False)
     assert [(tmp_path / f"smoothed.csv.earlier-{k}").read_text() for k in (1, 2)] == [content] * 2
     first, second = (json.loads(line)["text"] for line in capsys.readouterr().err.splitlines())
-    assert f"{rows}: is of a run that is not gone on from; it is {rows}.earlier-1 now" in first
+    assert f"{rows}: is of a run that is not continued; it is {rows}.earlier-1 now" in first
     assert f"and had 10000 when the checkpoint was written; it is {rows}.earlier-2 now" in second
     rows.write_text(content)
     with service._smoothed_file(str(rows), 0):

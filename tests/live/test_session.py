@@ -47,11 +47,11 @@ def test_a_detector_that_is_started_again_goes_on_and_is_told_of_once():
             session.accept(message(k, start + 0.05 * k), f"broker:{k}: ")
     assert len(answered) == 80
     (warning,) = said
-    assert warning.startswith("warning: broker:0: source 'g7' counts anew from seq 0")
+    assert warning.startswith("warning: broker:0: source 'g7' restarts its count at seq 0")
     assert session.duplicates == 0
     assert session.summary()["restarts"] == {"g7": 1}
     session.finish()
-    assert said[1:] == ["source 'g7' began to count its messages anew once"]
+    assert said[1:] == ["source 'g7' restarted its count of messages once"]
 
 
 def test_one_that_is_started_again_and_again_is_told_of_some_times():
@@ -61,7 +61,7 @@ def test_one_that_is_started_again_and_again_is_told_of_some_times():
     assert len(answered) == 20
     assert len(said) == MOST_WARNED
     assert said[-1].endswith("further ones are only counted")
-    assert session.summary_lines() == ["source 'g7' began to count its messages anew 19 times"]
+    assert session.summary_lines() == ["source 'g7' restarted its count of messages 19 times"]
 
 
 def test_messages_that_had_been_taken_are_in_the_summary():

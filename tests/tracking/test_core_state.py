@@ -308,7 +308,7 @@ def test_a_file_of_other_settings_or_of_another_version_is_refused(tmp_path):
         Tracker.load(path, load_config("default", ["smoother.lag_s=2", *_PICTURE]))
     text, block = read_state_file(path, "state")
     write_state_file(path, text.replace(b'"format": ', b'"format": 9'), block)
-    with pytest.raises(JeatGraphError, match="begin anew"):
+    with pytest.raises(JeatGraphError, match="start over"):
         Tracker.load(path)
 
 

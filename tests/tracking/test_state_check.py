@@ -206,7 +206,7 @@ FORGED = {
     "sensor0.leftovers": [-1.0],
     "sensor0.false_boxes": [-5.0],
     "sensor0.period_s": [-1.0, np.inf],
-    "sensor0.last_look_s": [1e9, np.inf],
+    "sensor0.last_scan_s": [1e9, np.inf],
     "sensor0.boxes": [-1.0],
     "sensor0.repeated": [1e9],
     "sensor0.boxes_at_edge": [-1.0],

@@ -12,7 +12,7 @@
 
 namespace jeat::detection {
 
-// What is a flicker: shortest and longest period, and after how long a pixel begins anew (µs); after so many
+// What is a flicker: shortest and longest period, and after how long a pixel starts over (µs); after so many
 // periods it flickers.
 struct FlickerRule {
     std::int64_t shortest_us, longest_us, forgotten_us;

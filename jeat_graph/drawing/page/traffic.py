@@ -246,7 +246,7 @@ def _left_out(traffic: CountedTraffic) -> str:
     items = [f"{count} × {reason}" for reason, count in traffic.left_out.items()]
     unknown = sum(not math.isfinite(one.kmh) for one in traffic.passed)
     if unknown:
-        items.append(f"{unknown} × counted, but the speed is not known well enough to be told")
+        items.append(f"{unknown} × counted, but the speed is not known well enough to be reported")
     if traffic.span is None:
         items.append("Begin and end of the recording are not known: those of the crossings are taken.")
     if not items:

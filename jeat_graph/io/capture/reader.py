@@ -76,7 +76,7 @@ class LiveStatus:
 class LiveReader(Generic[Item]):
     """Reads a camera until it is closed; a context manager.
 
-    The connection is made, and made anew when it breaks off, for as long as it takes, with growing pauses;
+    The connection is made, and made again when it breaks off, for as long as it takes, with growing pauses;
     each of this is told in a line. Who takes the items more slowly than they come gets the newest ones.
 
     Args:
@@ -84,7 +84,7 @@ class LiveReader(Generic[Item]):
         connect: makes a connection.
         tell: takes each line for the user; called by the reading thread.
         waiting: so many items may wait.
-        patience_s: a camera that is connected and gives nothing for so long (s) is connected anew.
+        patience_s: a camera that is connected and gives nothing for so long (s) is connected again.
 
     Attributes:
         status: how the camera is doing; only to read.

@@ -17,7 +17,7 @@ _RISE, _FALL = 2e-4, 1e-2
 _AT_ITS_TIME = 0.5
 #: What has gone on for so long is no store that is being emptied (s).
 _LONGEST_STORE_S = 10.0
-#: Stamps that leap by more than this (s) begin anew.
+#: Stamps that leap by more than this (s) start over.
 _LEAP_S = 10.0
 #: Stamps are another clock's if for so long (s) every picture is late by more than this (s).
 _WATCH_S, _LATE_S = 10.0, 1.0
@@ -40,7 +40,7 @@ class StreamClock:
         self.restart(by_stamps)
 
     def restart(self, by_stamps: bool = True) -> None:
-        """Begin anew with a new connection; times still ascend."""
+        """Start over with a new connection; times still ascend."""
         self.by_stamps = by_stamps
         self._settled = False
         self._first_s: float | None = None

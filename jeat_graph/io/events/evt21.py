@@ -11,7 +11,7 @@ others, continued           14, 15  what the camera says about itself; passed ov
 ==========================  ======  ==========================================================================
 
 Some cameras send the upper half of each word first: the header calls that `endianness=legacy`, and where it
-says nothing the halves are told apart by the types that they would be.
+says nothing the halves are distinguished by the types that they would be.
 Source: https://docs.prophesee.ai/stable/data/encoding_formats/evt21.html
 """
 

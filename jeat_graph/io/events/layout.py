@@ -180,7 +180,7 @@ def polarity_of_words(words: Sequence[Any]) -> npt.NDArray[np.float64] | None:
 def unit_of(
     t: npt.NDArray[Any], x: npt.NDArray[Any], y: npt.NDArray[Any], likely: str | None = None
 ) -> str | None:
-    """Tell the unit of times by how often the pixels fire; None where it cannot be told.
+    """Tell the unit of times by how often the pixels fire; None where it cannot be known.
 
     Args:
         t: (N,) times as the file has them, in any order.

@@ -53,7 +53,7 @@ def open_events(
     Raises:
         ConfigError: an extra package is needed for this format.
         DataError: no such file, or none of the formats that are read; the message says what it is instead.
-            The file says a picture larger than the one given. Columns, times or the recording cannot be told;
+            The file says a picture larger than the one given. Columns, times or the recording are unclear;
             the message names the option that says it.
     """
     layout = layout or EventLayout()

@@ -1,6 +1,6 @@
 """Reads any table of events through the common reader: text, NumPy, MATLAB, HDF5 without an index.
 
-A format gives columns, block by block; here they are told apart (`layout`), brought to µs, 0 and 1, and
+A format gives columns, block by block; here they are distinguished (`layout`), brought to µs, 0 and 1, and
 whole pixels, and put in order.
 """
 
@@ -272,7 +272,8 @@ def _places(
     if len(orders) == 1:
         return {role: orders[0].index(role) for role in ROLES}, None
     could = (
-        " or ".join(",".join(order) for order in orders) or "time, place and polarity not to be told apart"
+        " or ".join(",".join(order) for order in orders)
+        or "time, place and polarity, which cannot be distinguished"
     )
     raise DataError(
         f"does not name its {count} columns, and the data do not say which is which ({could}); say it with "

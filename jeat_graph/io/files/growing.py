@@ -1,7 +1,7 @@
 """Files that grow by whole lines for months, and may be moved away meanwhile (logrotate); or pipes.
 
 A file that was moved away keeps what it has; the next lines begin a new file under the old name. One that was
-emptied in its place (`copytruncate`) begins anew, too. Both begin with the same head.
+emptied in its place (`copytruncate`) starts over, too. Both begin with the same head.
 """
 
 from __future__ import annotations

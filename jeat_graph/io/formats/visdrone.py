@@ -59,7 +59,7 @@ FORMAT = BoxFormat(
     name="visdrone",
     title="VisDrone",
     reads="text of its sequences (10 columns), with the names of its categories; score 0, ignored regions "
-    "and `others` are ignored in truth; told from MOTChallenge by the file's name (`uav…_v.txt`)",
+    "and `others` are ignored in truth; known from MOTChallenge by the file's name (`uav…_v.txt`)",
     recognise=_recognise,
     read=read_boxes,
     counts_frames=always,

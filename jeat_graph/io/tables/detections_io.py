@@ -122,7 +122,7 @@ def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
             those without a class.
 
     Raises:
-        DataError: as `read_detections`; or two files whose format does not name sensors are not told apart.
+        DataError: as `read_detections`; or two files whose format names no sensors have one name.
     """
     # The files of some sensors may have classes and others none: chosen when they are together.
     classes = options.pop("classes", None)
@@ -158,7 +158,7 @@ def detection_readers(paths: Sequence[str | Path], **options: Any) -> list[Reade
         options: as `read_many`, without `classes`.
 
     Raises:
-        DataError: two files whose format does not name sensors are not told apart.
+        DataError: two files whose format names no sensors have one name.
     """
     if not paths:
         raise DataError("no detections file given")

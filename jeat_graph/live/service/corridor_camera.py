@@ -41,7 +41,7 @@ class PassageWatch:
         self._until = -math.inf
 
     def begin(self, state: Any) -> None:
-        """Go on from a checkpoint's state, or begin anew; who was told before may be told again."""
+        """Go on from a checkpoint's state, or start over; who was told before may be told again."""
         with self._lock:
             self._line = self._new_line()
             if state is not None:

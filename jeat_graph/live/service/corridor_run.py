@@ -43,7 +43,7 @@ class CorridorService:
     Args:
         config: of the service.
         log: takes what is to be said.
-        sets_aside_damaged: whether a damaged checkpoint is renamed and begun anew; or refused.
+        sets_aside_damaged: whether a damaged checkpoint is renamed and started over; or refused.
 
     Attributes:
         interrupts: of the process.
@@ -184,10 +184,10 @@ class CorridorService:
         except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             if not self._sets_aside_damaged and self._config.state.of_another_version == "refuse":
                 raise ConfigError(
-                    f"{path}: cannot be gone on from: {error}; or let --set-aside-damaged rename it"
+                    f"{path}: cannot be continued from: {error}; or let --set-aside-damaged rename it"
                 ) from None
             aside = set_aside(path, "damaged")
-            self._log.write(WARNING, f"{path}: cannot be gone on from: {error}; it is {aside} now")
+            self._log.write(WARNING, f"{path}: cannot be continued from: {error}; it is {aside} now")
             self._live = LiveCorridor(self._config.gaps(), self._config.follow.interval_s)
 
     def _stopped(self) -> bool:

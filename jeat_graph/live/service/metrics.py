@@ -87,7 +87,7 @@ class Metrics(MetricsText):
             age: list[tuple[list[str], float]] = [([], now - status.saved)]
             yield family(gauge, "checkpoint_age_seconds", "since the newest checkpoint", age)
         aside: list[tuple[list[str], float]] = [([], float(len(status.set_aside)))]
-        yield family(gauge, "checkpoints_set_aside", "that could not be gone on from at the start", aside)
+        yield family(gauge, "checkpoints_set_aside", "that could not be continued from at the start", aside)
         for name, value in health["messages"].items():
             if name != "passed_over":  # scans, by sensor
                 text = f"messages or checkpoints {name.replace('_', ' ')}"

@@ -57,7 +57,7 @@ class Watcher(Protocol):
     """Is shown all answers of a service."""
 
     def begin(self, state: Any) -> None:
-        """Go on from what `state` returned, or begin anew with None."""
+        """Go on from what `state` returned, or start over with None."""
 
     def answered(self, t: float, table: Trajectories) -> None:
         """Take in the tracks of a time (s), which has been answered."""
@@ -72,7 +72,7 @@ class Service:
     Args:
         config: of the service.
         log: takes what is to be said.
-        sets_aside_damaged: whether a damaged checkpoint is renamed and the tracker begins anew; or refused.
+        sets_aside_damaged: whether a damaged checkpoint is renamed and the tracker starts over; or refused.
         interrupts: of the process, if it does more than this.
         watcher: is shown all answers, and has its state in the checkpoint.
     """
@@ -220,7 +220,7 @@ class Service:
         """The tracker from the checkpoint, and what was kept with it; None if there is none to go on from.
 
         Raises:
-            ConfigError: it cannot be gone on from, and is not to be set aside.
+            ConfigError: it cannot be continued from, and is not to be set aside.
         """
         state, late = self._config.state, self._config.tracker.late
         path = state.checkpoint
@@ -236,14 +236,14 @@ class Service:
                 damaged = isinstance(error, DataError)
                 if damaged and not self._sets_aside_damaged:
                     raise ConfigError(
-                        f"{error}; or let --set-aside-damaged rename it and begin anew"
+                        f"{error}; or let --set-aside-damaged rename it and start over"
                     ) from None
                 if not damaged and state.of_another_version == "refuse":
                     raise ConfigError(
-                        f"{error}; or let `state.of_another_version: set-aside` rename it and begin anew"
+                        f"{error}; or let `state.of_another_version: set-aside` rename it and start over"
                     ) from None
                 aside = set_aside(path, "damaged" if damaged else "other-version")
-                text = f"{error}; it is {aside} now, and the tracker begins anew: tracks get new identities"
+                text = f"{error}; it is {aside} now, and the tracker starts over: tracks get new identities"
                 self.status.set_aside.append(text)
                 self._log.say(f"warning: {text}")
         return None
@@ -253,7 +253,7 @@ class Service:
         try:
             if keep_bytes is not None or not has_rows(path):
                 return SmoothedFile(path, keep_bytes, self._overdue)
-            why = f"{path}: is of a run that is not gone on from"
+            why = f"{path}: is of a run that is not continued"
         except DataError as error:
             if not has_rows(path):  # a folder, say
                 raise

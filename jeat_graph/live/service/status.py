@@ -111,7 +111,7 @@ class Status:
         counted: what is counted.
         lag_s: how long after its own time the newest scan was answered (s), or None.
         tracks: how many are reported now.
-        set_aside: why a checkpoint was set aside and the tracker began anew; a line for each.
+        set_aside: why a checkpoint was set aside and the tracker started over; a line for each.
         saved: when the newest checkpoint was written (s, of `time.monotonic`), or None.
         beat: when the main thread last did something (s, of `time.monotonic`).
         detectors_beat: tells the same of the detectors, of that which was silent for longest.

@@ -40,7 +40,7 @@ class NatsSource:
     """Messages of a subject from its JetStream stream, in the stream's order (see `record.Source`).
 
     The consumer is called `durable` (option; the default is made of stream and subject, so that streams of
-    other subjects have others). After a crash, and after a lost connection, it is made anew where it was,
+    other subjects have others). After a crash, and after a lost connection, it is made again where it was,
     so that what is delivered again comes in its order and not mixed with what is new. One that reads another
     subject, that was made by another program or that another stream is using is left alone.
 
@@ -159,7 +159,7 @@ class NatsSource:
             return  # it is mended by itself
         self._notices.once(
             f"warning: {self.address}: the consumer {self._durable!r} of stream {link.stream!r} is gone; "
-            "it is made anew"
+            "it is made again"
         )
         with contextlib.suppress(NatsError, TimeoutError):
             self._subscribe(self._last)

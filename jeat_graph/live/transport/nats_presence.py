@@ -79,7 +79,7 @@ class Presence:
         return False
 
     def made(self, created: Any) -> None:
-        """Keep when, by the server's clock, the consumer was made anew."""
+        """Keep when, by the server's clock, the consumer was made again."""
         self._created = created
 
     def check(self) -> None:

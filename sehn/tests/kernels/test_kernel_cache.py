@@ -56,7 +56,7 @@ def test_a_private_temporary_folder_stands_in(tmp_path):
 def test_without_any_folder_it_is_compiled_in_each_run(tmp_path):
     answer, notice, place = run(tmp_path, temporary=False)
     assert answer == "42"
-    assert "compiled anew in each run" in notice
+    assert "compiled again in each run" in notice
     assert place == "None"
 
 

@@ -61,7 +61,7 @@ def test_asked_for_is_who_has_moved_since_a_stream_began(small_set):
 def test_streams_begin_one_after_the_other_and_each_goes_on():
     settings = TrainSettings(batch=6, stream_share=0.5, stream_steps=6)
     begins = np.array([[stream_begin(step, k, settings) for k in range(6)] for step in range(30)])
-    assert (begins[:, 3:] == np.arange(30)[:, None]).all(), "the others begin anew"
+    assert (begins[:, 3:] == np.arange(30)[:, None]).all(), "the others start over"
     ages = np.arange(30)[:, None] - begins[:, :3]
     assert ages.min() == 0
     assert ages.max() == 5

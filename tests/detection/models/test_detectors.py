@@ -1,4 +1,4 @@
-"""Networks from files: fed as they want it, run by either backend, told apart from what they are not."""
+"""Networks from files: fed as they want it, run by either backend, distinguished from what they are not."""
 
 from __future__ import annotations
 

@@ -408,7 +408,7 @@ def test_polarity_may_be_said_in_words(tmp_path, on, off):
 
 def test_five_columns_without_names_are_left_to_the_user(tmp_path):
     (tmp_path / "e.csv").write_text(lines(T, X, Y, P, P))
-    with pytest.raises(DataError, match=r"does not name its 5 columns, .* not to be told apart"):
+    with pytest.raises(DataError, match=r"does not name its 5 columns, .* cannot be distinguished"):
         read(tmp_path / "e.csv")
     said = EventLayout(columns=("t", "x", "y", "p", "-"))
     np.testing.assert_array_equal(read(tmp_path / "e.csv", layout=said)[0].polarity, P)

@@ -51,7 +51,7 @@ def _fit(network: Network, *, turned: bool) -> Fit:
 
 
 def _numbers(network: Network) -> tuple[int | None, int | None]:
-    """Return how many numbers a cell has, and how many cells there are; None where it cannot be told."""
+    """Return how many numbers a cell has, and how many cells there are; None where it cannot be known."""
     assert network.table is not None
     first, second = network.table
     counts = cell_counts(network.side)

@@ -58,7 +58,7 @@ def read_entry(root: Path, index: int) -> dict[str, Any]:
     entry = read_json(path)
     lacking = [key for key in (*_COUNTS, "index", "split", "sha256") if key not in entry]
     if lacking:
-        raise DataError(f"lacks {lacking[0]!r}; remove the segment's folder to make it anew", path)
+        raise DataError(f"lacks {lacking[0]!r}; remove the segment's folder to make it again", path)
     return entry
 
 

@@ -95,7 +95,7 @@ def test_after_an_event_a_pixel_is_blind_for_the_refractory_period() -> None:
 
 
 def test_an_endless_ramp_fires_once_a_threshold_and_a_refractory_period() -> None:
-    # After the dead time the pixel begins anew from where the signal is: period = C / slope + dead time.
+    # After the dead time the pixel starts over from where the signal is: period = C / slope + dead time.
     slope, threshold, dead = 5.0, 0.2, 0.004
     times = np.linspace(0.0, 2e6, 3001)
     light = np.exp(slope * 1e-6 * times)[:, None]
