@@ -63,7 +63,8 @@ def no_repetition() -> RepeatCounts:
 
 def logit(score: FloatArray) -> FloatArray:
     """Return ln(s / (1 − s)) of scores (M,), bounded."""
-    bounded = np.clip(score, _LEAST_SCORE, 1.0 - _LEAST_SCORE)
+    # As np.clip, which takes longer than the rest for the boxes of one scan.
+    bounded = np.minimum(np.maximum(score, _LEAST_SCORE), 1.0 - _LEAST_SCORE)
     return np.asarray(np.log(bounded / (1.0 - bounded)))
 
 

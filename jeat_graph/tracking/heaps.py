@@ -35,24 +35,29 @@ class Heaps:
         parts = []
         for scan in batch:
             parts.append(self._of_scan(scan))
-        whole = np.concatenate(parts)
-        return None if whole.all() else whole
+        if all(part is None for part in parts):
+            return None
+        return np.concatenate(
+            [
+                np.ones(len(scan), dtype=np.bool_) if part is None else part
+                for scan, part in zip(batch, parts, strict=True)
+            ]
+        )
 
     def end(self) -> None:
         """Say nothing of any scan any more."""
         self._quiet = True
 
-    def _of_scan(self, scan: Scan) -> BoolArray:
-        out = np.ones(len(scan), dtype=np.bool_)
+    def _of_scan(self, scan: Scan) -> BoolArray | None:
         if len(scan) <= self._constants.most_on_one_spot:
-            return out
+            return None
         sides = np.concatenate([scan.boxes[:, :2], scan.boxes[:, :2] + scan.boxes[:, 2:]], axis=1)
         kept_boxes = heaps.kept_boxes if self._engine == "reference" else core.kept_boxes
         kept = kept_boxes(sides, np.ascontiguousarray(scan.scores), self._constants)
         if len(kept) == len(scan):
-            return out
+            return None
         self._say(scan, len(kept))
-        out[:] = False
+        out = np.zeros(len(scan), dtype=np.bool_)
         out[kept] = True
         return out
 

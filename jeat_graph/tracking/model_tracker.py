@@ -202,14 +202,14 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
             JeatGraphError: after `finish`.
         """
         batch = as_scans(scans)
-        self.meet(batch)
+        self._meet(batch)
         if self._common.ways:
             batch = [self._common.boxes(scan) for scan in batch]
         self._take_in(batch)
         if self._smooths:
             self._instants.note(float(batch[0].t))
             self._model.hand_over(None, None, *self._called_now())
-        return self.causal()
+        return self._causal_table()
 
     def take_in(self, batch: Sequence[Scan], owners: FloatArray | None = None) -> PendingStep | None:
         """Do a step for a caller who may have to take it back, and hands it to the smoothers later.
@@ -225,7 +225,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
             DataError, UnknownSensorError, TimeOrderError: as `step`.
             JeatGraphError: after `finish`.
         """
-        self.meet(batch)
+        self._meet(batch)
         self._take_in(batch, owners)
         if not self._smooths:
             return None
@@ -330,6 +330,9 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         Raises:
             UnknownSensorError: a name that is not declared and may not be, or too many sensors.
         """
+        self._meet(scans)
+
+    def _meet(self, scans: Sequence[Scan]) -> None:
         known = self.config.sensors
         if all(scan.sensor in known for scan in scans):
             return
@@ -343,9 +346,11 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
 
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, as the last step did: not the rows of earlier steps."""
+        return self._causal_table()
+
+    def _causal_table(self) -> Trajectories:
         if self._causal is None:
-            now = self.time
-            parts = self._model.reported(), self._classes, self._form(), now
+            parts = self._model.reported(), self._classes, self._form(), self.time
             self._causal = promised(partial(reported_table, *parts))
         return self._causal
 

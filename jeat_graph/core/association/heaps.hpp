@@ -73,11 +73,28 @@ private:
     std::map<int, Class> classes_;
 };
 
+// Whether any box touches so many others. No ordinary scan has one, and it costs less to see that than to choose.
+inline bool any_touches(std::span<const Sides> boxes, double number) {
+    const std::vector<Sides> sides(boxes.begin(), boxes.end());
+    const filters::ByLeft index(sides);
+    for (const Sides& box : sides) {
+        double touching = -1.0;  // itself
+        index.near(box, [&](std::size_t k) { touching += filters::intersection(box, sides[k]) > 0.0; });
+        if (touching >= number) return true;
+    }
+    return false;
+}
+// With more boxes than this, all of them in one column of the picture, that costs more.
+inline constexpr std::size_t kMostAtOnce = 2048;
+
 // Places of the boxes that count, ascending.
 inline std::vector<std::int64_t> kept_boxes(std::span<const Sides> boxes, std::span<const double> scores, double most_on_one_spot,
                                             double spot_overlap, double most_touching) {
     std::vector<std::int64_t> order(boxes.size()), out;
     std::iota(order.begin(), order.end(), std::int64_t{0});
+    if (boxes.size() <= kMostAtOnce && spot_overlap > 0.0 &&
+        !any_touches(boxes, std::min(most_on_one_spot, most_touching)))
+        return order;
     const auto score = [&](std::int64_t k) { return scores[static_cast<std::size_t>(k)]; };
     std::stable_sort(order.begin(), order.end(), [&](std::int64_t a, std::int64_t b) { return score(a) > score(b); });
     BoxGrid kept;

@@ -18,8 +18,9 @@ using filters::SidesExpected;
 // What holds for all pairs of one scan.
 struct ScanTerms {
     double student_constant, log_clutter;
+    filters::ShareLogs logs;
 
-    ScanTerms(double leftovers, double picture_area, const ModelConstants& c) {
+    ScanTerms(double leftovers, double picture_area, const ModelConstants& c) : logs(c) {
         const double nu = c.degrees_of_freedom;
         student_constant = log_gamma((nu + 4.0) / 2.0) - log_gamma(nu / 2.0) - 2.0 * log_of(nu * kPi);
         log_clutter = log_of((leftovers + c.clutter_prior) / (picture_area * c.clutter_size_area));
@@ -34,22 +35,23 @@ inline double score_likelihood(double r, double q, const ModelConstants& c) {
 inline constexpr double kImpossible = -1e9;
 
 // ln p(y) where an occluder cuts one side, or has cut it so far, and the other three fit.
-inline double cut_log_density(const std::array<double, 4>& y, const SidesExpected& expected, const ModelConstants& c) {
+inline double cut_log_density(const std::array<double, 4>& y, const SidesExpected& expected,
+                              const filters::ShareLogs& logs, const ModelConstants& c) {
     double out = kImpossible;
     for (int axis = 0; axis < 2; ++axis) {
         const filters::Pair2 &S = expected.S[axis], &across = expected.S[1 - axis];
         const double left = y[2 * axis], right = y[2 * axis + 1], size = expected.size[axis];
         const double d2 = across.squared_distance(y[2 - 2 * axis], y[3 - 2 * axis]);
         if (d2 > c.cut_gate) continue;
-        const double whole = -0.5 * d2 - 0.5 * log_of(across.determinant()) - 1.5 * filters::kLog2Pi - log_of(size);
-        const auto with = [&](double other, double variance, double inwards) {
+        const double whole = -0.5 * d2 - 0.5 * expected.log_det[1 - axis] - 1.5 * filters::kLog2Pi - expected.log_size[axis];
+        const auto with = [&](double other, double variance, double log_variance, double inwards) {
             const double alone = other * other / variance;
             if (inwards >= size || inwards <= -c.most_uncovered * size || d2 + alone > c.cut_gate) return;
-            const double share = log_of(inwards > 0.0 ? c.cut_share : c.uncovered_share);
-            out = log_add(out, share + whole - 0.5 * alone - 0.5 * log_of(variance));
+            const double share = inwards > 0.0 ? logs.cut : logs.uncovered;
+            out = log_add(out, share + whole - 0.5 * alone - 0.5 * log_variance);
         };
-        with(right, S.rr, left);
-        with(left, S.ll, -right);
+        with(right, S.rr, expected.log_right[axis], left);
+        with(left, S.ll, expected.log_left[axis], -right);
     }
     return out;
 }
@@ -57,10 +59,10 @@ inline double cut_log_density(const std::array<double, 4>& y, const SidesExpecte
 // ln p(y) of a pair, or kImpossible where it lies outside every gate.
 inline double sides_log_density(const std::array<double, 4>& y, const SidesExpected& expected, const ScanTerms& terms,
                                 const ModelConstants& c) {
-    const double d2 = filters::squared_distance(y, expected.S), cut = cut_log_density(y, expected, c);
+    const double d2 = filters::squared_distance(y, expected.S), cut = cut_log_density(y, expected, terms.logs, c);
     if (d2 > c.gate) return cut;
     const double nu = c.degrees_of_freedom;
-    const double body = terms.student_constant - 0.5 * expected.log_det - (nu + 4.0) / 2.0 * log1p_of(d2 / nu);
+    const double body = terms.student_constant - 0.5 * (expected.log_det[0] + expected.log_det[1]) - (nu + 4.0) / 2.0 * log1p_of(d2 / nu);
     return log_add(cut, body);
 }
 

@@ -24,7 +24,12 @@ struct CameraMotion {
 // A track that is compared with the boxes, and what was found of it.
 struct CameraTrack {
     double x, y, w, h, scale, Sx, Sy, Sw, Sh;
+    double widest;  // a box that is wider is no pair
 };
+
+inline double widest_pair(double width, double log_width_variance) {
+    return exp_of(std::sqrt(kPairingGate * log_width_variance)) * width;
+}
 
 namespace detail {
 
@@ -66,7 +71,7 @@ inline std::vector<std::pair<std::size_t, std::size_t>> nearest_pairs(const std:
         const double y0 = t.y + moved[1] + moved[2] * (t.y - height / 2.0);
         // A box that is near in centre and in ln width has its left side near, too.
         const double dx = std::sqrt(kPairingGate * (t.Sx + allowance));
-        const double most = exp_of(std::sqrt(kPairingGate * t.Sw)) * t.w / 2.0;
+        const double most = t.widest / 2.0;
         index.with_left_in(x0 - dx - most, x0 + dx, [&](std::size_t j) {
             const Sides& b = boxes[j];
             const double x = (b.left + b.right) / 2.0 - x0, y = (b.top + b.bottom) / 2.0 - y0;
@@ -85,9 +90,8 @@ inline std::vector<std::pair<std::size_t, std::size_t>> nearest_pairs(const std:
 
 // Whether boxes speak against a motion that pictures show: far fewer tracks have one where it `moved` them.
 inline bool contradicted(const std::vector<CameraTrack>& tracks, const std::vector<CameraTrack>& moved,
-                         const std::vector<Sides>& boxes, const CameraVariance& prior) {
+                         const std::vector<Sides>& boxes, const ByLeft& index, const CameraVariance& prior) {
     if (tracks.size() < kLeastWitnesses || boxes.empty()) return false;
-    const ByLeft index(boxes);
     const double variance = std::min(prior.shift * kPairingDeviations, kPairingMost);
     const std::size_t without = nearest_pairs(tracks, boxes, index, {}, 0.0, 0.0, variance).size();
     const std::size_t paired = nearest_pairs(moved, boxes, index, {}, 0.0, 0.0, variance).size();
@@ -95,10 +99,9 @@ inline bool contradicted(const std::vector<CameraTrack>& tracks, const std::vect
 }
 
 inline CameraMotion estimate_camera(const std::vector<CameraTrack>& tracks, const std::vector<Sides>& boxes,
-                                    double width, double height, double dt, CameraVariance& prior, const ModelConstants& c) {
+                                    const ByLeft& index, double width, double height, double dt, CameraVariance& prior, const ModelConstants& c) {
     CameraMotion out;
     if (tracks.size() < kLeastTracks || boxes.empty()) return out;
-    const ByLeft index(boxes);
     const double variance = std::min(prior.shift * kPairingDeviations, kPairingMost);
     auto pairs = nearest_pairs(tracks, boxes, index, {}, width, height, variance);
     // The camera may have gone on as before: rows of like objects are else taken for their neighbours.

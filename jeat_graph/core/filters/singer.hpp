@@ -1,6 +1,7 @@
 // Singer's motion model of one axis, [p, v, a, l, r, b, c], seven states; the formulas are in filters/singer.py.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +9,7 @@
 #include "constants.hpp"
 #include "filters/model_constants.hpp"
 #include "math.hpp"
+#include "wide.hpp"
 
 namespace jeat::filters {
 
@@ -157,35 +159,47 @@ inline constexpr int kDriven[kStates][2] = {{kPosition, kAcceleration}, {kVeloci
                                             {kLogSize, kGrowth}, {kGrowth, kGrowth}, {kPositionError, kPositionError},
                                             {kSizeError, kSizeError}};
 
+// Rows of matrices are this long where loops over them are to become vectors.
+inline constexpr int kRow = kStates + 1;
+using Rows = double[kStates][kRow];
+
+// P <- F P F' + Q of one axis. Where F' is 0 it adds 0 to sums that began with 0, which changes none of them.
+inline void predict_covariance(double* P, const Matrix& F, const Rows& Ft, const Matrix& Q) {
+    Rows from = {};
+    for (int i = 0; i < kStates; ++i) std::copy(P + i * kStates, P + (i + 1) * kStates, from[i]);
+    for (int i = 0; i < kStates; ++i) {
+        double FP[kRow] = {}, sum[kRow] = {};
+        for (int k = kDriven[i][0]; k <= kDriven[i][1]; ++k)
+            for (int j = 0; j < kRow; ++j) FP[j] += F[i * kStates + k] * from[k][j];
+        for (int k = i; k < kStates; ++k)
+            for (int j = 0; j < kRow; ++j) sum[j] += FP[k] * Ft[k][j];
+        for (int j = i; j < kStates; ++j) P[i * kStates + j] = P[j * kStates + i] = sum[j] + Q[i * kStates + j];
+    }
+}
+
 // m <- F m, P <- F P F' + Q.
-inline void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
-                    const ModelConstants& c) {
+JEAT_GRAPH_WIDE void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
+                             const ModelConstants& c) {
     const Matrix F = in_perspective(step.F, mean_growth(mean), dt, c);
     const double size = object_size(mean);
     std::array<double, kMean> predicted{};
-    for (int axis = 0; axis < 2; ++axis)
-        for (int i = 0; i < kStates; ++i)
-            for (int j = kDriven[i][0]; j <= kDriven[i][1]; ++j)
+    Rows Ft = {};
+    for (int i = 0; i < kStates; ++i)
+        for (int j = kDriven[i][0]; j <= kDriven[i][1]; ++j) {
+            Ft[j][i] = F[i * kStates + j];
+            for (int axis = 0; axis < 2; ++axis)
                 predicted[axis * kStates + i] += F[i * kStates + j] * mean[axis * kStates + j];
+        }
     const double growth = 0.5 * (std::abs(predicted[kGrowth]) + std::abs(predicted[kStates + kGrowth]));
     const double g = std::min(growth, c.fastest_growth);
     const double jerk = q.root_jerk + c.perspective_jerk * g * g * std::sqrt(g);
     const double by_jerk = square(jerk * size), by_walk = q.position * square(size);
+    Matrix Q;
+    for (int k = 0; k < kMatrix; ++k)
+        Q[k] = by_jerk * step.jerk[k] + q.growth * step.growth[k] + q.size * step.size[k] + by_walk * step.position[k];
     for (int axis = 0; axis < 2; ++axis) {
         double* const P = covariance + axis * kMatrix;
-        Matrix FP{};
-        for (int i = 0; i < kStates; ++i)
-            for (int k = kDriven[i][0]; k <= kDriven[i][1]; ++k)
-                for (int j = i; j < kStates; ++j) FP[i * kStates + j] += F[i * kStates + k] * P[k * kStates + j];
-        for (int i = 0; i < kStates; ++i)
-            for (int j = i; j < kStates; ++j) {
-                double sum = 0.0;
-                for (int k = kDriven[j][0]; k <= kDriven[j][1]; ++k) sum += FP[i * kStates + k] * F[j * kStates + k];
-                const int at = i * kStates + j;
-                sum += by_jerk * step.jerk[at] + q.growth * step.growth[at] + q.size * step.size[at] +
-                       by_walk * step.position[at];
-                P[at] = P[j * kStates + i] = sum;
-            }
+        predict_covariance(P, F, Ft, Q);
         const LastingError error(exp_of(mean[axis * kStates + kLogSize]), size, q.rho2, c);
         const double forgotten = 1.0 - square(F[kPositionError * kStates + kPositionError]);
         P[kPositionError * kStates + kPositionError] += forgotten * error.position;

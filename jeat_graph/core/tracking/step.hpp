@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "arrays.hpp"
@@ -40,7 +41,7 @@ struct Scan {
 
 class Step {
 public:
-    explicit Step(State& state) : s_(state), c_(state.constants) {}
+    explicit Step(State& state) : s_(state), c_(state.constants), logs_(c_) {}
 
     // Take in all scans of one time, at most one of each sensor; `motion`, if known, is that of the camera since its
     // picture before. `reported` is written.
@@ -212,6 +213,7 @@ private:
             boxes_.push_back(corrected(box, offset));
             edges_.push_back(ends ? edges_of(box, s_.width, s_.height, c_) : Edges{});
         }
+        index_.emplace(boxes_);
     }
 
     // Once a time: with its first scan. A motion that its boxes speak against is none.
@@ -231,7 +233,7 @@ private:
             moved_tracks_[k].x += change.rate[0] * change.elapsed;
             moved_tracks_[k].y += change.rate[1] * change.elapsed;
         }
-        if (contradicted(camera_tracks_, moved_tracks_, boxes_, s_.camera)) return;
+        if (contradicted(camera_tracks_, moved_tracks_, boxes_, *index_, s_.camera)) return;
         for (std::size_t i = 0; i < tracks.size(); ++i)
             follow(tracks.mean_of(i), tracks.covariance_of(i), changes_[i], *motion, camera, now);
         camera = now;
@@ -252,11 +254,13 @@ private:
             const double Rw = side_variance(w, both, rho2, c_), Rh = side_variance(h, both, rho2, c_);
             const auto sum = [](const double* Q, int i, int j) { return Q[i * kStates + i] + 2.0 * Q[i * kStates + j] + Q[j * kStates + j]; };
             sure_rows_.push_back(i);
+            const double log_width_variance = sum(P, kLogSize, kSizeError) + 2.0 * Rw / (w * w);
             camera_tracks_.push_back({(box.left + box.right) / 2.0, (box.top + box.bottom) / 2.0, w, h, both,
                                       sum(P, kPosition, kPositionError) + Rw / 2.0,
                                       sum(P + kMatrix, kPosition, kPositionError) + Rh / 2.0,
-                                      sum(P, kLogSize, kSizeError) + 2.0 * Rw / (w * w),
-                                      sum(P + kMatrix, kLogSize, kSizeError) + 2.0 * Rh / (h * h)});
+                                      log_width_variance,
+                                      sum(P + kMatrix, kLogSize, kSizeError) + 2.0 * Rh / (h * h),
+                                      widest_pair(w, log_width_variance)});
         }
     }
 
@@ -265,7 +269,7 @@ private:
         const double rho2 = exp_of(s_.log_side_variance[scan.sensor]), dt = static_cast<double>(ticks_) / filters::kTicksPerS;
         if (ticks_ <= 0) return;  // no time, no motion
         see_sure_tracks(rho2);
-        const CameraMotion motion = estimate_camera(camera_tracks_, boxes_, s_.width, s_.height, dt, s_.camera, c_);
+        const CameraMotion motion = estimate_camera(camera_tracks_, boxes_, *index_, s_.width, s_.height, dt, s_.camera, c_);
         if (!motion.known) return;
         const double lasting = (1.0 - exp_of(-dt / c_.camera_time_s)) / dt;
         for (std::size_t i = 0; i < tracks.size(); ++i)
@@ -286,7 +290,7 @@ private:
             of_clutter_[j] = association::score_likelihood(c_.clutter_precision, q_[j], c_);
         }
         const association::ScanTerms terms(s_.sensors[k].leftovers, s_.width * s_.height, c_);
-        const ByLeft index(boxes_);
+        const ByLeft& index = *index_;
         weigh_boxes(scan, index);
         order_owners(scan);
         pairs_.clear();
@@ -403,9 +407,9 @@ private:
             const SidesExpected expected = cut.any() ? with_cut(expected_[i], cut, c_) : expected_[i];
             std::array<double, 4> left_over = innovations_[m];
             // To the smoother a side that shows again is part of the prediction: the states before did not know of it.
-            if (filters::uncover_sides(tracks.mean_of(i), tracks.covariance_of(i), left_over, expected, cut, c_) && record)
+            if (filters::uncover_sides(tracks.mean_of(i), tracks.covariance_of(i), left_over, expected, cut, logs_, c_) && record)
                 write_prediction(entries[i], i);
-            filters::update(tracks.mean_of(i), tracks.covariance_of(i), innovations_[m], left_over, expected, cut, c_);
+            filters::update(tracks.mean_of(i), tracks.covariance_of(i), innovations_[m], left_over, expected, cut, logs_, c_);
         }
     }
 
@@ -460,7 +464,7 @@ private:
         Tracks& tracks = s_.tracks;
         const std::size_t n = tracks.size(), k = scan.sensor;
         rivals_.clear();
-        for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t i = 0; i < n && !free_.empty(); ++i)
             if (tracks.real[i] > c_.rival && unseen_for(i) < c_.rival_age_s) rivals_.push_back(corners(tracks.mean_of(i)));
         const ByLeft rivals(rivals_);
         free_boxes_.clear();
@@ -524,11 +528,17 @@ private:
     // Keep of each track that was found now the least overlap ever with a better one.
     void compare_overlaps() {
         Tracks& tracks = s_.tracks;
+        const auto compared = [&](std::size_t i) {
+            return unseen_for(i) < kSameTimeS && tracks.evidence.overlap[i] != 0.0;
+        };
+        std::size_t first = 0;
+        while (first < tracks.size() && !compared(first)) ++first;
+        if (first == tracks.size()) return;
         tracks_boxes_.resize(tracks.size());
         for (std::size_t i = 0; i < tracks.size(); ++i) tracks_boxes_[i] = corners(tracks.mean_of(i));
         const ByLeft index(tracks_boxes_);
-        for (std::size_t i = 0; i < tracks.size(); ++i) {
-            if (!(unseen_for(i) < kSameTimeS) || tracks.evidence.overlap[i] == 0.0) continue;
+        for (std::size_t i = first; i < tracks.size(); ++i) {
+            if (!compared(i)) continue;
             may_be_interrupted();
             double most = 0.0;
             index.near(tracks_boxes_[i], [&](std::size_t j) {
@@ -647,6 +657,8 @@ private:
     std::vector<double> p_detect_, q_, of_clutter_;
     std::vector<std::uint8_t> confirms_;  // of the scan's boxes
     std::vector<std::array<double, 4>> innovations_;  // of the pairs that are made
+    const ShareLogs logs_;
+    std::optional<ByLeft> index_;  // of boxes_
     std::vector<Sides> boxes_, rivals_, free_boxes_, tracks_boxes_;
     std::vector<CameraTrack> camera_tracks_, moved_tracks_;
     std::vector<std::size_t> sure_rows_;
