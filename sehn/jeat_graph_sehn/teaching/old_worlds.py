@@ -16,7 +16,8 @@ from jeat_graph_sehn.simulation.scenario import load_scenario, scenario_to_yaml
 
 #: Lights of the worlds, and segments of each, a quarter of which is held back.
 SCENARIOS, SEGMENTS = ("day", "night", "night-nolight"), 4
-_SHARES = (0.75, 0.25, 0.0)
+#: The division has a seed of its own, by which one of four segments is held back, the second one.
+_SHARES, _SPLIT_SEED = (0.75, 0.25, 0.0), 0
 #: Pictures of a segment (1 s), and their size (px).
 _FRAMES, _SIZE = 20, (640, 384)
 #: Seeds from here on belong to these worlds: those of training and of tests are small numbers.
@@ -43,7 +44,7 @@ def render_old_worlds(
         scenario, own_seed = load_scenario(name, None), _FIRST_SEED + seed
         sensors = "events" if events else "rgb"
         factory = partial(RenderedSource, scenario, imaging, own_seed, _FRAMES, "varied", sensors)
-        protocol = Protocol(SEGMENTS, own_seed, _SHARES, video="png")
+        protocol = Protocol(SEGMENTS, _SPLIT_SEED, _SHARES, video="png")
         record_dataset(
             factory,
             folder / name,
