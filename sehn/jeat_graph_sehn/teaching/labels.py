@@ -13,6 +13,7 @@ What a detector believed to see and no track took is masked, too. All else is ba
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,8 +34,11 @@ UNSEEN_S = 0.25
 HIDDEN_SHARE = 0.3
 #: At both ends of a track so much is masked (s).
 END_S = 0.3
-#: A detection with this score is more likely real than not; where no track took it, its place is masked.
+#: Score from which on a detection is more likely real than not, where nothing is known of its sensor.
 BELIEVED_SCORE = 0.5
+#: Where no track took such a detection, its place is masked for so long before and after (s): until the same
+#: detector looks again, which says more.
+MASKED_S = 0.1
 #: Overlap (IoU) with a track's box at which a detection is of it, and share of a detection on one.
 TAKEN_IOU, TAKEN_SHARE = 0.3, 0.7
 #: Labels are this far apart at least (s): between two of them vehicles move evenly.
@@ -86,19 +90,21 @@ class TrackLabels:
         return np.unique(self.truth.object_id[~self.truth.ignore])
 
 
-def labels_of(tracks: Trajectories, detections: Detections) -> TrackLabels:
+def labels_of(
+    tracks: Trajectories, detections: Detections, believed: Mapping[str, float] | None = None
+) -> TrackLabels:
     """Make labels of smoothed tracks.
 
     Args:
         tracks: smoothed, over the whole recording.
         detections: that they were made of, in the same picture and on the same clock.
+        believed: score by sensor from which on a detection is more likely real than not.
     """
     frames = spread_times(np.unique(detections.scan_t))
     rows = np.isin(tracks.t, frames) & (tracks.existence >= ABSENT)
     masked = masked_rows(tracks)[rows]
     chosen = tracks.take(rows)
-    t, boxes = unexplained(detections, tracks, frames)
-    ids = FIRST_MASK - np.arange(len(t))
+    t, boxes, ids = unexplained(detections, tracks, frames, believed or {})
     truth = GroundTruth(
         t=np.concatenate([chosen.t, t]),
         object_id=np.concatenate([chosen.track_id, ids]),
@@ -180,30 +186,34 @@ def _unseen_or_at_ends(tracks: Trajectories) -> BoolArray:
 
 
 def unexplained(
-    detections: Detections, tracks: Trajectories, frames: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+    detections: Detections, tracks: Trajectories, frames: FloatArray, believed: Mapping[str, float]
+) -> tuple[FloatArray, FloatArray, IntArray]:
     """Return detections that their detectors believed and no track took: where they are, nobody knows.
 
     Args:
         detections: all.
         tracks: of them.
         frames: (T,) times at which labels are wanted (s), ascending.
+        believed: as of `labels_of`.
 
     Returns:
-        Times (K,) out of `frames`, the nearest ones, and boxes (K, 4).
+        Times (K,) out of `frames`, those near to a detection, boxes (K, 4), and an id (K,) of each detection.
     """
     order = np.argsort(tracks.t, kind="stable")
     times = tracks.t[order]
-    found_t, found = [np.zeros(0)], [np.zeros((0, 4))]
+    found_t, found, ids = [np.zeros(0)], [np.zeros((0, 4))], [np.zeros(0, dtype=np.int64)]
+    count = 0
     for scan in detections.scans():
-        boxes = scan.boxes[scan.scores >= BELIEVED_SCORE]
+        boxes = scan.boxes[scan.scores >= believed.get(scan.sensor, BELIEVED_SCORE)]
         if not len(boxes):
             continue
         rows = order[np.searchsorted(times, scan.t, "left") : np.searchsorted(times, scan.t, "right")]
         there = tracks.boxes[rows]
         taken = (pairwise_iou(boxes, there) >= TAKEN_IOU) | (pairwise_covered(boxes, there) >= TAKEN_SHARE)
         boxes = boxes[~taken.any(axis=1)]
-        nearest = int(np.abs(frames - scan.t).argmin())
-        found_t.append(np.full(len(boxes), frames[nearest]))
-        found.append(boxes)
-    return np.concatenate(found_t), np.concatenate(found)
+        near = frames[np.abs(frames - scan.t) <= MASKED_S]
+        found_t.append(np.repeat(near, len(boxes)))
+        found.append(np.tile(boxes, (len(near), 1)))
+        ids.append(np.tile(FIRST_MASK - count - np.arange(len(boxes)), len(near)))
+        count += len(boxes)
+    return np.concatenate(found_t), np.concatenate(found), np.concatenate(ids)

@@ -184,7 +184,8 @@ def _labels(detections: Detections, given: Config, say: Callable[[str], object])
         warnings.simplefilter("ignore", InputWarning)  # `track` and `register` say them
         tracks = track(common, settings)
     assert tracks.smoothed is not None  # the settings ask for identities by the whole recording
-    return labels_of(tracks.smoothed, at_measurement(common, settings))
+    even = {name: one.even_score for name, one in settings.sensors.items() if one.even_score is not None}
+    return labels_of(tracks.smoothed, at_measurement(common, settings), even)
 
 
 def _later(request: LessonRequest, recorded: Detections) -> float:

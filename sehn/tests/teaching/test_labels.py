@@ -8,7 +8,15 @@ import pytest
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph_sehn.teaching.drawn_truth import DrawnTruth, WeighedTruth, chances
-from jeat_graph_sehn.teaching.labels import TrackLabels, hidden, labels_of, masked_rows, spread_times, vague
+from jeat_graph_sehn.teaching.labels import (
+    TrackLabels,
+    hidden,
+    labels_of,
+    masked_rows,
+    spread_times,
+    unexplained,
+    vague,
+)
 
 BOX = (100.0, 100.0, 40.0, 20.0)
 
@@ -90,7 +98,19 @@ def test_what_was_believed_and_no_track_took_is_masked():
     lone = labels.truth.object_id < 0
     assert labels.truth.boxes[lone].tolist() == [list(far)]
     assert labels.truth.ignore[lone].all()
-    assert labels.truth.t[lone].tolist() == [0.0]
+    assert labels.truth.t[lone].tolist() == [0.0]  # the next label is farther than 0.1 s
+    labels = labels_of(tracks(TIMES), scans(TIMES, [near, far, weak], [0.9, 0.6, 0.4]), {"rgb": 0.3})
+    assert (labels.truth.object_id < 0).sum() == 2
+
+
+def test_a_mask_lasts_until_the_detector_looks_again():
+    times = np.arange(9) / 16
+    far = (300.0, 100.0, 40.0, 20.0)
+    detections = Detections.from_rows([times[4]], ["rgb"], [far], [0.9])
+    t, boxes, ids = unexplained(detections, tracks(times), times, {})
+    assert t.tolist() == times[3:6].tolist()  # 0.1 s before and after
+    assert boxes.tolist() == [list(far)] * 3
+    assert len(set(ids.tolist())) == 1
 
 
 def test_labels_stand_at_times_that_are_apart():
