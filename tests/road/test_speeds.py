@@ -14,7 +14,7 @@ from jeat_graph.eval.counting import Line, crossings
 from jeat_graph.road.crossings import crossing, road_line
 from jeat_graph.road.lanes import LaneConfig, find_lanes
 from jeat_graph.road.motion_fit import MotionFitConfig, error_covariance, fit_motion, thinned
-from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle, interval, told
+from jeat_graph.road.speeds import ContactConfig, Vehicle, fit_vehicle, interval, reported_speed
 from jeat_graph.road.stuck import vehicles_part
 
 MOTION = MotionFitConfig()
@@ -260,10 +260,10 @@ def test_vehicles_anywhere_across_the_road_show_no_lanes_of_their_own() -> None:
 
 
 def test_a_speed_of_which_next_to_nothing_is_known_is_not_told() -> None:
-    assert told(interval(80.0, 5.0, 1.0)) == interval(80.0, 5.0, 1.0)
-    assert told(interval(0.0, 4.0, 0.0)).kmh == 0.0
-    assert math.isnan(told(interval(78.8, 100.0, 0.0)).kmh)
-    assert math.isnan(told(interval(3.0, 8.0, 0.0)).low_kmh)
+    assert reported_speed(interval(80.0, 5.0, 1.0)) == interval(80.0, 5.0, 1.0)
+    assert reported_speed(interval(0.0, 4.0, 0.0)).kmh == 0.0
+    assert math.isnan(reported_speed(interval(78.8, 100.0, 0.0)).kmh)
+    assert math.isnan(reported_speed(interval(3.0, 8.0, 0.0)).low_kmh)
 
 
 def test_all_of_many_vehicles_are_unbiased() -> None:
