@@ -52,6 +52,26 @@ class Pieces(NamedTuple):
     left_at_rim: BoolArray
 
 
+class Past(NamedTuple):
+    """What was decided before these pieces, of a recording that goes on.
+
+    Attributes:
+        births: (2,) identities that began in the interior, and at the rim.
+        leaving, continued: (2,) pieces that were never, and that were, continued, by where they ended.
+        gaps: (G,) of the last links that were made (s).
+    """
+
+    births: FloatArray
+    leaving: FloatArray
+    continued: FloatArray
+    gaps: FloatArray
+
+    @classmethod
+    def none(cls) -> Past:
+        """Return that of a recording's beginning."""
+        return cls(np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(0))
+
+
 class Joined(NamedTuple):
     """What was found.
 
@@ -72,6 +92,7 @@ def join(
     votes: FloatArray,
     span: tuple[float, float],
     step_s: float,
+    past: Past | None = None,
 ) -> Joined:
     """Find the best cover of pieces.
 
@@ -81,7 +102,9 @@ def join(
         votes: (E,) share of the passes that made each.
         span: first and last time of the recording (s).
         step_s: time from one look to the next (s).
+        past: what was decided before, of other pieces.
     """
+    before = Past.none() if past is None else past
     u = pieces.begins[possible.head] - pieces.ends[possible.tail]
     steps = (span[1] - span[0]) / step_s + 1.0
     births, exits, median = np.array(_FIRST_BIRTHS) / steps, np.array(_FIRST_EXITS), _FIRST_GAP_S
@@ -101,10 +124,10 @@ def join(
         continued, continues = cover >= 0, np.zeros(len(cover), dtype=bool)
         continues[links.head[made]] = True
         new, leaves = ~continues & ~first, ~continued & ~last
-        births = np.asarray((np.bincount(born[new], minlength=2) + 1.0) / steps, dtype=np.float64)
-        leaving = np.bincount(left[leaves], minlength=2) + 1.0
-        exits = leaving / (leaving + np.bincount(left[continued], minlength=2) + 1.0)
-        gaps = u[made]
+        births = (np.bincount(born[new], minlength=2) + before.births + 1.0) / steps
+        leaving = np.bincount(left[leaves], minlength=2) + before.leaving + 1.0
+        exits = leaving / (leaving + np.bincount(left[continued], minlength=2) + before.continued + 1.0)
+        gaps = np.concatenate([u[made], before.gaps])
         median = float(np.median(np.append(gaps[gaps > 1.5 * step_s], [_PRIOR_GAP_S] * _PRIOR_GAPS)))
     return Joined(links, cover, terms)
 

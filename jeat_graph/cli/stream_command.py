@@ -148,7 +148,12 @@ def _run(args: argparse.Namespace, cameras: LiveDetecting | None) -> int:
         smoothed = None
         if args.smoothed is not None:
             smoothed = stack.enter_context(
-                SmoothedFile(args.smoothed, more.get("smoothed"), interrupts.overdue)
+                SmoothedFile(
+                    args.smoothed,
+                    more.get("smoothed"),
+                    interrupts.overdue,
+                    identities=config.smoother.identities == "lag",
+                )
             )
         output = StreamOutput(args.format, args.encoding, sink, interrupts.overdue)
         ends = Ends(

@@ -50,8 +50,9 @@ class Config:
     paper: PaperConfig = field(default_factory=PaperConfig)
 
     def __post_init__(self) -> None:
-        if self.tracker.engine == "paper" and self.smoother.identities == "whole":
-            raise ConfigError("smoother.identities: 'whole' needs another engine than tracker.engine=paper")
+        if self.tracker.engine == "paper" and self.smoother.identities in ("lag", "whole"):
+            said = repr(self.smoother.identities)
+            raise ConfigError(f"smoother.identities: {said} needs another engine than tracker.engine=paper")
         if not self.sensors and self.input.undeclared != "declare":
             raise ConfigError("sensors: at least one sensor must be declared")
         if len(self.sensors) > MOST_SENSORS:

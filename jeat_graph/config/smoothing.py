@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from jeat_graph.config.fields import Section, choice, number
 from jeat_graph.data.errors import InputWarning
 
-IDENTITIES = ("causal", "whole")
+IDENTITIES = ("causal", "lag", "whole")
 ENGINES = ("fixed-lag", "full", "gtsam", "gtsam-full", "none")
 #: Names that engines had.
 FORMER = {"fixed-lag-rts": "fixed-lag", "rts": "full"}
@@ -33,8 +33,9 @@ class SmootherConfig(Section):
     identities: str = choice(
         "causal",
         IDENTITIES,
-        "who is who in the smoothed table. causal: as the causal table says; whole: decided once more at the "
-        "end with the whole recording in view, which is kept in memory; not for streams",
+        "who is who in the smoothed table. causal: as the causal table says; lag: decided once more with "
+        "`lag_s` of the future in view, and never changed again; whole: decided at the end with the whole "
+        "recording in view, which is kept in memory; not for streams",
     )
     road: str = choice(
         "spline",

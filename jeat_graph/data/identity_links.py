@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 
@@ -30,5 +32,17 @@ class IdentityLinks(NamedTuple):
 
     def between_tracks(self) -> IdentityLinks:
         """Return the links that join two causal tracks, without those that leave one as it was."""
-        keep = self.tail != self.head
-        return IdentityLinks(*(column[keep] for column in self))
+        return self.take(np.flatnonzero(self.tail != self.head))
+
+    def take(self, rows: IntArray) -> IdentityLinks:
+        """Return some links by their places (M,)."""
+        return IdentityLinks(
+            self.track_id[rows],
+            self.tail[rows],
+            self.head[rows],
+            self.t_tail[rows],
+            self.t_head[rows],
+            self.log_ratio[rows],
+            self.probability[rows],
+            self.terms[rows],
+        )

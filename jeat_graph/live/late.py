@@ -50,9 +50,8 @@ def check_saved(tracker: Tracker, what: str) -> None:
     Raises:
         ConfigError: the tracker's engine keeps no state.
     """
-    if not tracker.can_save:
-        engine = tracker.config.tracker.engine
-        raise ConfigError(f"{what} does not go with tracker.engine={engine}: it is not saved")
+    if tracker.not_saved_with is not None:
+        raise ConfigError(f"{what} does not go with {tracker.not_saved_with}: it is not saved")
 
 
 @one_at_a_time("causal step save predict drain_smoothed finish")
@@ -82,6 +81,7 @@ class LiveTracker(OneAtATime):
             raise ConfigError("paper.pair_within_s: whoever gives the scans pairs them (`stream --joint`)")
         if tracker.keeps_recording:
             raise ConfigError("smoother.identities: 'whole' needs the whole recording, in order of time")
+        tracker.forget_links()
         self.tracker = tracker
         self.policy = policy
         self.lateness = LatenessCounter()

@@ -13,7 +13,11 @@ from jeat_graph.io.files.growing import GrowingFile
 from jeat_graph.io.files.pipe_writer import never
 from jeat_graph.io.streams.track_lines import csv_header, csv_rows
 
-_HEADS = tuple(csv_header(classes).encode() for classes in (False, True))
+# Headers without classes and with them, by whether identities were decided again.
+_HEADS = {
+    decided: tuple(csv_header(classes, decided).encode() for classes in (False, True))
+    for decided in (False, True)
+}
 
 
 class SmoothedFile:
@@ -28,6 +32,7 @@ class SmoothedFile:
         path: the file; replaced, or with `keep_bytes` gone on with.
         keep_bytes: how many bytes of it to keep, from a checkpoint; what came after them comes again. If it
             has no rows now, it was moved away since: a new one begins, with a warning.
+        identities: whether rows have identities that were decided again.
         over: of a pipe, tells whether the program is to end and its reader is not waited for any longer.
 
     Raises:
@@ -35,8 +40,14 @@ class SmoothedFile:
     """
 
     def __init__(
-        self, path: str | Path, keep_bytes: int | None = None, over: Callable[[], bool] = never
+        self,
+        path: str | Path,
+        keep_bytes: int | None = None,
+        over: Callable[[], bool] = never,
+        *,
+        identities: bool = False,
     ) -> None:
+        self._heads = _HEADS[identities]
         self._path, self._over = Path(path), over
         if self._path.is_dir():
             raise DataError("is a folder; --smoothed must name a file", path)
@@ -61,7 +72,7 @@ class SmoothedFile:
                 head = file.readline()
         self._file = GrowingFile(self._path, self._keep, self._over)
         if head:
-            self.begin(head == _HEADS[True])
+            self.begin(head == self._heads[True])
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -76,7 +87,7 @@ class SmoothedFile:
         """
         if self._classes is None:
             self._classes = classes
-            self._file.begin(_HEADS[classes])
+            self._file.begin(self._heads[classes])
 
     def append(self, table: Trajectories) -> None:
         """Add rows, and hand them to the system at once."""
@@ -94,4 +105,5 @@ def has_rows(path: str | Path) -> bool:
     if not Path(path).is_file():
         return False
     with Path(path).open("rb") as file:
-        return file.read(max(map(len, _HEADS)) + 1) not in (b"", *_HEADS)
+        heads = [head for both in _HEADS.values() for head in both]
+        return file.read(max(map(len, heads)) + 1) not in (b"", *heads)

@@ -59,8 +59,7 @@ class RunIdentities:
         """Return the links of an identity, in order of time."""
         if self.links is None:
             return None
-        own = self.links.track_id == track_id
-        return IdentityLinks(*(column[own] for column in self.links))
+        return self.links.take(np.flatnonzero(self.links.track_id == track_id))
 
     def _parts(self, rows: IntArray) -> list[IdentityPart]:
         table = self.table

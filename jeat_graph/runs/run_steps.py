@@ -71,10 +71,8 @@ class RunSteps:
         self._done = 0
         self._unfinished: UnfinishedRun | None = None
         saved = None
-        if options.resume and not self._tracker.can_save:
-            raise ConfigError(
-                f"--resume does not go with tracker.engine={config.tracker.engine}: it is not saved"
-            )
+        if options.resume and self._tracker.not_saved_with is not None:
+            raise ConfigError(f"--resume does not go with {self._tracker.not_saved_with}: it is not saved")
         if len(self._instants) > STEPS_PER_SAVE and self._tracker.can_save:
             self._unfinished = UnfinishedRun(run.folder / RESUME, self._identity())
             saved = self._unfinished.load() if options.resume else None
@@ -235,7 +233,7 @@ class _Files(ExitStack):
         asked = {CSV.name, *options.formats}
         suffixes = [one.suffix for one in written_formats() if one.is_table and one.name in asked]
         kinds = ("causal", "smoothed") if config.smoother.engine != "none" else ("causal",)
-        decided = config.smoother.identities == "whole"
+        decided = config.smoother.identities in ("lag", "whole")
         writers: dict[str, list[PiecewiseWriter | MeasurementWriter]] = {
             kind: [
                 TrajectoryWriter(

@@ -12,12 +12,13 @@ import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.tracking.appearance import Appearances
 from jeat_graph.tracking.classes import ClassTally
 from jeat_graph.tracking.damage import refusing_damage
 from jeat_graph.tracking.engine import Moment, StepBoxes, TrackEngine
+from jeat_graph.tracking.identities.lagging import LagSmoother
 from jeat_graph.tracking.identities.log import IdentityLog
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothed_instants import SmoothedInstants
@@ -63,6 +64,7 @@ class SavedModel:
         _called: list[str]
         _instants: SmoothedInstants
         _log: IdentityLog | None
+        _lag: LagSmoother | None
 
         def __init__(
             self, config: Config, *, diagnostics: bool = False, constants: ModelConstants | None = None
@@ -78,7 +80,14 @@ class SavedModel:
     @property
     def can_save(self) -> bool:
         """Whether a run that was broken off can go on."""
-        return self._model.can_save
+        return self.not_saved_with is None
+
+    @property
+    def not_saved_with(self) -> str | None:
+        """The setting with which a tracker is not saved, or None where it is."""
+        if not self._model.can_save:
+            return f"tracker.engine={self.config.tracker.engine}"
+        return None if self._lag is None else "smoother.identities=lag"
 
     def save(self, path: str | Path) -> None:
         """Write the whole state to a file (`.npz`), smoothers included, for `load` to go on from.
@@ -107,6 +116,8 @@ class SavedModel:
         Raises:
             JeatGraphError: the engine is not saved.
         """
+        if self._lag is not None:
+            raise JeatGraphError(f"a tracker with {self.not_saved_with} is not saved")
         now = self.snapshot() if snapshot is None else snapshot
         return {
             "diagnostics": self._diagnostics,

@@ -32,8 +32,9 @@ from jeat_graph.tracking.engines import make_engine
 from jeat_graph.tracking.first_sight import wider
 from jeat_graph.tracking.heaps import Heaps
 from jeat_graph.tracking.hypotheses import Hypotheses
-from jeat_graph.tracking.identities.log import IdentityLog
-from jeat_graph.tracking.identities.passes import took
+from jeat_graph.tracking.identities.lagging import LagSmoother
+from jeat_graph.tracking.identities.log import IdentityLog, counted
+from jeat_graph.tracking.identities.passes import Pass, took
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import diagnostics_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
@@ -119,9 +120,11 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         self._places = Places(())  # where these stand among all
         self.logs_assigned = True
         self._diagnostics = diagnostics
-        wanted, whole = config.smoother.engine != "none", config.smoother.identities == "whole"
-        self._smooths = wanted and not whole
-        self._log = IdentityLog() if wanted and whole else None
+        wanted, identities = config.smoother.engine != "none", config.smoother.identities
+        self._smooths = wanted and identities != "whole"
+        self._log = IdentityLog() if wanted and identities == "whole" else None
+        self._lag = LagSmoother(config.smoother) if wanted and identities == "lag" else None
+        self._counted: tuple[list[Scan], Pass] | None = None  # of the last step, where that is not None
         self._links: IdentityLinks | None = None
         self._model: TrackEngine = make_engine(config if self._smooths else unsmoothed(config), constants)
         if diagnostics and not self._model.has_fit:
@@ -209,6 +212,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         if self._smooths:
             self._instants.note(float(batch[0].t))
             self._model.hand_over(None, None, *self._called_now())
+            self._decide_later(self._counted, self._model.living(), None)
         return self._causal_table()
 
     def take_in(self, batch: Sequence[Scan], owners: FloatArray | None = None) -> PendingStep | None:
@@ -230,7 +234,8 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         if not self._smooths:
             return None
         ids, t = self._model.living(), float(batch[0].t)
-        return PendingStep(self._model.record(), t, ids, *self._called_now())
+        label, share = self._called_now()
+        return PendingStep(self._model.record(), t, ids, label, share, batch=self._counted)
 
     def _take_in(self, batch: Sequence[Scan], owners: FloatArray | None = None) -> None:
         if self._finished:
@@ -255,6 +260,8 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         self._order, self._given, self._causal = found.order, count, None
         if self._log is not None:
             self._log.add(batch, took(self, count), kept)
+        if self._lag is not None:
+            self._counted = counted(batch, took(self, count), kept)
         if self._diagnostics:
             sensor = sensors_of(batch, codes)[found.order]
             self._boxes = StepBoxes(t, sensor, found.boxes.copy())
@@ -268,6 +275,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         if taken is not None:
             self._instants.note(taken.t)
             self._model.hand_over(taken.record, taken.given, taken.label, taken.share)
+            self._decide_later(taken.batch, taken.ids, taken.given)
 
     def snapshot(self) -> ModelSnapshot:
         """Copy all that the next step depends on; the smoothers are not part of it."""
@@ -297,6 +305,8 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         Identities go on, and so does what was learnt of the scene: it is as if no time had passed.
         """
         if self.time is not None:
+            if self._lag is not None:
+                self._lag.reset(self, t)
             self._model.reset(t)
             # The model has no last step now, so there are no boxes of one either.
             self._order, self._given = _NO_BOXES, 0

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.detections import Scan
 from jeat_graph.tracking.engine import Recorded
+from jeat_graph.tracking.identities.passes import Pass
 
 
 class PendingStep(NamedTuple):
@@ -18,6 +20,7 @@ class PendingStep(NamedTuple):
         label: (N,) numbers of their classes, or None.
         share: (N,) of the votes that speak for these, or None.
         given: (N,) identities that the tables are to have in their place, or None.
+        batch: its scans, and which tracks took their detections, where identities are decided with a lag.
     """
 
     record: Recorded
@@ -26,3 +29,4 @@ class PendingStep(NamedTuple):
     label: IntArray | None = None
     share: FloatArray | None = None
     given: IntArray | None = None
+    batch: tuple[list[Scan], Pass] | None = None

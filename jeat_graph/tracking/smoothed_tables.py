@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import deepcopy
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
+
+from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.corrected_tracks import CorrectedTracks, Disagreements
+from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.smoothers.rows import ModelRows
 from jeat_graph.tracking.engine import TrackEngine
 from jeat_graph.tracking.identities.corrected import along_corrected
+from jeat_graph.tracking.identities.lagging import LagSmoother
 from jeat_graph.tracking.identities.log import IdentityLog
+from jeat_graph.tracking.identities.passes import Pass
 from jeat_graph.tracking.identities.whole import decided
 
 if TYPE_CHECKING:
@@ -31,6 +38,7 @@ class SmoothedTables:
         _smooths: bool
         _finished: bool
         _log: IdentityLog | None
+        _lag: LagSmoother | None
         _links: IdentityLinks | None
 
         def _smoothed_table(self, rows: ModelRows) -> Trajectories:
@@ -50,6 +58,8 @@ class SmoothedTables:
         self._check_smooths()
         if self._log is not None:
             return Trajectories.concatenate(list(self._decided(self._log)))
+        if self._lag is not None:  # as if it ended now
+            return deepcopy(self._tracker()).finish()
         return self._smoothed_table(self._model.smoothed())
 
     def drain_smoothed(self) -> Trajectories:
@@ -61,11 +71,14 @@ class SmoothedTables:
         self._check_smooths()
         if self._log is not None:  # nothing is final before the end
             return Trajectories.empty(self.sensor_names)
-        return self._smoothed_table(self._model.drain())
+        rows = self._smoothed_table(self._model.drain())
+        return rows if self._lag is None else self._lag.drain(rows)
 
     def settle(self) -> None:
         """Have the smoother be as one that was saved and loaded."""
         self._model.settle()
+        if self._lag is not None:
+            self._lag.settle()
 
     def finish(self) -> Trajectories:
         """End all tracks and return their smoothed trajectories; empty when called again."""
@@ -78,11 +91,19 @@ class SmoothedTables:
             return iter(())
         if self._log is not None:
             return self._decided(self._log)
+        if self._lag is not None:
+            rows = self._smoothed_table(self._model.finish())
+            return iter((self._lag.finish(self._tracker(), rows),))
         return iter((self._smoothed_table(self._model.finish()),) if self._smooths else ())
 
     def identity_links(self) -> IdentityLinks | None:
         """Return what the smoother joined, after `finish`; None where identities are causal."""
-        return self._links
+        return self._links if self._lag is None else self._lag.links()
+
+    def forget_links(self) -> None:
+        """Have the tracker keep no links: of a stream that goes on for months there are ever more."""
+        if self._lag is not None:
+            self._lag.logs_links = False
 
     def follow(self, rows: CorrectedTracks) -> None:
         """Have the smoothed tables follow identities that a person has corrected.
@@ -104,6 +125,23 @@ class SmoothedTables:
         else:
             self._links, pieces = decided(self._tracker(), log)
         return pieces
+
+    def _decide_later(
+        self, batch: tuple[list[Scan], Pass] | None, ids: IntArray, given: IntArray | None
+    ) -> None:
+        """Have identities of a step that the smoother was told of be decided with a lag, if they are.
+
+        Args:
+            batch: its scans, and which tracks took their detections.
+            ids: (N,) the tracks after it.
+            given: (N,) identities that the tables have in their place, or None.
+        """
+        if self._lag is None or batch is None:
+            return
+        scans, taken = batch
+        if given is not None:
+            taken = taken._replace(assigned=given[np.searchsorted(ids, taken.assigned)])
+        self._lag.note(scans, taken, ids if given is None else given, self._tracker())
 
     def _check_smooths(self) -> None:
         if not self._smooths and self._log is None:

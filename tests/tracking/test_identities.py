@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from jeat_graph import Detections, Scan, Tracker, load_config, read_run, track
+from jeat_graph import Detections, Scan, Tracker, Trajectories, load_config, read_run, track
 from jeat_graph.cli.main import main
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.data.errors import ConfigError, DataError, InputWarning, JeatGraphError
@@ -13,8 +13,8 @@ from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.checkpoint import save_state
 from jeat_graph.tracking.engine import StepInput
 from jeat_graph.tracking.engines import make_engine
-from jeat_graph.tracking.identities.deciding import LEAST_DETECTIONS, IdentityDecision, _with_weak
-from jeat_graph.tracking.identities.retracking import _more_to_come, changed_tracks
+from jeat_graph.tracking.identities.deciding import LEAST_DETECTIONS, IdentityDecision, with_weak
+from jeat_graph.tracking.identities.retracking import _more_to_come, changed_tracks, retrack
 
 BOTH = ("core", "reference")
 SIZE = ("image.width=3840", "image.height=2160")
@@ -293,7 +293,7 @@ def test_weak_detections_go_with_their_causal_track_where_its_chain_is_free():
     seen = MeasuredBoxes(t, np.zeros(6, dtype=int), np.zeros((6, 4)), np.zeros((6, 2, 2), dtype=bool))
     causal = np.array([1, 1, 1, 2, 1, 1])
     # Weak ones first, in between, and last; that of track 2 is nobody's.
-    assert _with_weak(seen, causal, np.arange(6), np.array([-1, 4, -1, -1, 4, -1])).tolist() == [
+    assert with_weak(seen, causal, np.arange(6), np.array([-1, 4, -1, -1, 4, -1])).tolist() == [
         4,
         4,
         4,
@@ -303,7 +303,7 @@ def test_weak_detections_go_with_their_causal_track_where_its_chain_is_free():
     ]
     # The chain goes on without it.
     piece = np.array([0, 1, 2, 3, 1, 4])
-    assert _with_weak(seen, causal, piece, np.array([-1, 4, -1, -1, 4, -1])).tolist() == [4, 4, -1, -1, 4, 4]
+    assert with_weak(seen, causal, piece, np.array([-1, 4, -1, -1, 4, -1])).tolist() == [4, 4, -1, -1, 4, 4]
 
 
 def test_track_decides_if_asked_and_says_what_it_joined(tmp_path):
@@ -323,6 +323,8 @@ def test_track_decides_if_asked_and_says_what_it_joined(tmp_path):
     found = track(tmp_path / "d.csv", load_config("default", WHOLE)).smoothed
     assert np.array_equal(found.track_id, smoothed.track_id)
     main([*command, str(tmp_path / "causal")])
+    whole, causally = ((tmp_path / name / "causal.csv").read_bytes() for name in ("run", "causal"))
+    assert whole == causally
     assert not (tmp_path / "causal" / "links.csv").exists()
     causal = read_run(tmp_path / "causal").smoothed
     assert causal.causal_id is None
@@ -332,7 +334,7 @@ def test_track_decides_if_asked_and_says_what_it_joined(tmp_path):
 def test_the_paper_and_streams_refuse_what_they_cannot():
     with pytest.raises(ConfigError, match="another engine"):
         load_config("paper", ["smoother.identities=whole"])
-    with pytest.raises(ConfigError, match="causal, whole"):
+    with pytest.raises(ConfigError, match="causal, lag, whole"):
         load_config("default", ["smoother.identities=all"])
     with pytest.raises(ConfigError, match="in order of time"):
         LiveTracker(Tracker(load_config("default", WHOLE)))
@@ -363,3 +365,24 @@ def test_boxes_that_do_not_count_are_nobodys():
         causal = tracked(scans, *WHOLE, "smoother.identities=causal")[1]
     assert len(smoothed)
     assert set(smoothed.causal_id.tolist()) <= set(causal.track_id.tolist())
+
+
+def test_what_is_cut_off_keeps_the_rows_of_the_track_that_it_was_of():
+    """Of a weak object: what begins anew in its midst is not believed for a while."""
+    rng = np.random.default_rng(3)
+    scans = []
+    for k in range(80):
+        centre = np.array([40.0 + 3.0 * k, 200.0]) + rng.normal(scale=0.5, size=2)
+        scans.append(Scan(k / 20, "rgb", boxes_of(centre), np.array([0.9 if k < 20 else 0.3])))
+    detections = Detections.from_scans(scans)
+    tracker, causal = tracked(scans, *SIZE)
+    assert set(causal.track_id.tolist()) == {1}
+    owner = np.where(np.arange(80) < 40, 1, 2)
+    decision = IdentityDecision.without_links(owner, np.ones(80, dtype=np.int64))
+    rows = Trajectories.concatenate(list(retrack(detections, decision, np.full(80, 0.5), tracker)))
+    assert sorted(rows.t.tolist()) == causal.t.tolist()
+    assert (rows.track_id == np.where(rows.t < 2.0, 1, 2)).all()
+    followed = Trajectories.concatenate(
+        list(retrack(detections, decision, np.full(80, 0.5), tracker, anew=True))
+    )
+    assert len(followed) < len(rows)  # what the model alone believes

@@ -31,7 +31,7 @@ class Joins:
         order = np.lexsort((table.t, table.track_id))
         ends = [_rows_at(table, order, links.track_id, t) for t in (links.t_tail, links.t_head)]
         keep = np.flatnonzero((ends[0] >= 0) & (ends[1] >= 0))
-        self._links = IdentityLinks(*(column[keep] for column in links))
+        self._links = links.take(keep)
         self._boxes = np.stack([table.boxes[rows[keep]] for rows in ends], axis=1)
 
     def __len__(self) -> int:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.column_names import SIZE_VAR
-from jeat_graph.data.tables.trajectory_table import COLUMNS, RUN_CLASSES
+from jeat_graph.data.tables.trajectory_table import COLUMNS, RUN_CLASSES, RUN_IDENTITIES
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.io.tables.table_writer import csv_lines
 from jeat_graph.io.tables.trajectories_io import EXISTENCE_DECIMALS, rounded, table_columns
@@ -59,11 +59,12 @@ def _nulls(values: list[float]) -> list[float | None]:
     return [None if value != value else value for value in values]
 
 
-def csv_header(classes: bool = False) -> str:
-    """Return the first line of a causal table, with or without the columns of classes."""
-    return ",".join((*COLUMNS, *(RUN_CLASSES if classes else ()), *SIZE_VAR)) + "\n"
+def csv_header(classes: bool = False, identities: bool = False) -> str:
+    """Return the first line of a table, with or without the columns of classes and of decided identities."""
+    more = (*SIZE_VAR, *(RUN_IDENTITIES if identities else ()))
+    return ",".join((*COLUMNS, *(RUN_CLASSES if classes else ()), *more)) + "\n"
 
 
 def csv_rows(table: Trajectories, classes: bool = False) -> str:
-    """Return the rows of one moment, byte for byte as `causal.csv` has them."""
+    """Return the rows of one moment, byte for byte as `causal.csv` or `smoothed.csv` has them."""
     return csv_lines(table_columns(table, classes)) if len(table) else ""

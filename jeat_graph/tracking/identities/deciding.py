@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.association import agreement
-from jeat_graph.association.linking import TERMS, Joined, Pieces, join
+from jeat_graph.association.linking import TERMS, Joined, Past, Pieces, join
 from jeat_graph.association.path_cover import Links, chains, preferring, sampled_covers, shares
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters.model_constants import ModelConstants
@@ -27,7 +27,7 @@ LEAST_LOG_ODDS = 0.0
 #: A piece of fewer detections goes with its causal track: what joins it tells next to nothing. Measured.
 LEAST_DETECTIONS = 10
 #: Parts of covers that lose less than this (nats) are taken as the causal identities have them. Measured.
-TIE = 6.0
+TIE = 3.0
 # Posteriors are kept from 0 and 1.
 _LEAST = 0.005
 # Detections at the end of a piece that its state there is estimated from.
@@ -43,6 +43,22 @@ _RIM = 0.5
 _SAMPLES, _SWEEPS = 200, 10
 # Covers are drawn with probabilities that go as exp(gain / this): gains are too sure by as much. Measured.
 _OVERCONFIDENCE = 2.0
+
+
+class SoFar(NamedTuple):
+    """What was decided of a recording before the pieces that are to be joined.
+
+    Attributes:
+        decided: (P,) pieces whose beginning is: nothing precedes them.
+        past: of those that are in view no more.
+        begun: time of the first look (s).
+        looks: how many there have been.
+    """
+
+    decided: BoolArray
+    past: Past
+    begun: float
+    looks: int
 
 
 class Recording(NamedTuple):
@@ -108,57 +124,88 @@ def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelCon
     assigned = np.stack([one.assigned for one in passes])
     piece = agreement.pieces(agreement.SeenBoxes(seen.t, seen.sensor), assigned, AGREED)
     odds = np.full(int(piece.max(initial=-1)) + 1, -np.inf)
-    np.maximum.at(odds, piece, 0.5 * (_log_odds(passes[0].real) + _log_odds(backward.real)))
+    np.maximum.at(odds, piece, 0.5 * (log_odds(passes[0].real) + log_odds(backward.real)))
     decided = (odds > LEAST_LOG_ODDS) & (np.bincount(piece, minlength=len(odds)) >= LEAST_DETECTIONS)
     number = np.full(len(odds), -1)
     number[decided] = np.arange(decided.sum())
     piece = number[piece] if len(piece) else piece
     if not (piece >= 0).any():
         return IdentityDecision.without_links(np.zeros_like(causal), causal)
-    members = _members(piece)
-    found, causal_cover = _joined(recording, members, piece, assigned, c)
+    members = members_of(piece)
+    found, causal_cover = joined_pieces(recording, members, piece, assigned, c)
     cover = preferring(found.links, found.cover, causal_cover, TIE)
     chain = chains(found.links, cover)
     owner = np.zeros(len(causal), dtype=np.int64)
     used = piece >= 0
     of = np.full(len(causal), -1)
     of[used] = chain[piece[used]]
-    of = _with_weak(seen, causal, piece, of)
+    of = with_weak(seen, causal, piece, of)
     owner[of >= 0] = _named(of[of >= 0], causal[of >= 0], int(causal.max()))
     made = cover[cover >= 0]
-    drawn, share = _drawn(found.links, cover)
+    drawn, share = drawn_covers(found.links, cover)
     probability = np.ones(len(causal))
-    probability[used] = _together(drawn, found.links, chain, members)[piece[used]]
+    probability[used] = together(drawn, found.links, chain, members)[piece[used]]
     tail = np.array([members[k][-1] for k in found.links.tail[made]], dtype=np.int64)
     head = np.array([members[k][0] for k in found.links.head[made]], dtype=np.int64)
     gain, terms = found.links.gain[made], found.terms[made]
     return IdentityDecision(owner, causal, probability, tail, head, gain, share[made], terms)
 
 
-def _joined(
-    recording: Recording, members: list[IntArray], piece: IntArray, assigned: IntArray, c: ModelConstants
+def joined_pieces(
+    recording: Recording,
+    members: list[IntArray],
+    piece: IntArray,
+    assigned: IntArray,
+    c: ModelConstants,
+    so_far: SoFar | None = None,
 ) -> tuple[Joined, IntArray]:
-    """Return the best cover of pieces, and the one (P,) that the causal pass made."""
-    seen, scene = recording.measured, recording.scene
+    """Return the best cover of pieces, and the one (P,) that the causal pass made.
+
+    Args:
+        recording: the detections.
+        members: those of each piece, in order of time.
+        piece: (N,) piece of each, -1 for none.
+        assigned: (R, N) who took them in every pass, of which the first is causal.
+        c: constants.
+        so_far: what was decided before; None for a whole recording.
+    """
+    seen, picture = recording.measured, recording.scene.picture
     first, last = (np.array([one[k] for one in members]) for k in (0, -1))
-    pieces = Pieces(
-        seen.t[first], seen.t[last], *(_at_rim(seen.boxes[k], scene.picture) for k in (first, last))
-    )
+    pieces = Pieces(seen.t[first], seen.t[last], *(at_rim(seen.boxes[k], picture) for k in (first, last)))
     made = agreement.votes_between(piece, assigned[:1], first)[:2]
     tail, head = _with_causal(_candidates(seen, first, last), made, seen.t[first], seen.t[last])
-    ends = ends_of(seen, _columns(members, from_end=True), scene, c)
-    begun = beginnings_of(seen, _columns(members, from_end=False), scene, c)
-    links = Links(tail, head, log_ratio(ends, tail, begun, head, scene, c))
+    scan_t, past = recording.scan_t, None
+    step = float(np.median(np.diff(scan_t))) if len(scan_t) > 1 else c.first_period_s
+    span = float(scan_t[0]), float(scan_t[-1])
+    if so_far is not None:
+        free = ~so_far.decided[head]
+        tail, head, past = tail[free], head[free], so_far.past
+        span = so_far.begun, span[1]
+        step = (span[1] - span[0]) / max(so_far.looks - 1, 1) or step
+        pieces = pieces._replace(begins=np.where(so_far.decided, span[0], pieces.begins))
+    ratio = _log_ratios(recording, members, tail, head, c)
+    links = Links(tail, head, ratio)
     causal = _of_pairs(links, *made, np.ones(len(made[0]), dtype=np.int64), len(members)) > 0
     links = links._replace(gain=np.where(causal, np.maximum(links.gain, _LEAST_CAUSAL), links.gain))
     possible = causal | (links.gain > _LEAST_RATIO)
     links, causal = links.where(possible), causal[possible]
     voted = agreement.votes_between(piece, assigned, first)
     votes = _of_pairs(links, *voted, len(members)) / len(assigned)
-    scan_t = recording.scan_t
-    step = float(np.median(np.diff(scan_t))) if len(scan_t) > 1 else c.first_period_s
-    found = join(pieces, links, votes, (float(scan_t[0]), float(scan_t[-1])), step)
+    found = join(pieces, links, votes, span, step, past)
     return found, _only_links(links, causal, len(members))
+
+
+def _log_ratios(
+    recording: Recording, members: list[IntArray], tail: IntArray, head: IntArray, c: ModelConstants
+) -> FloatArray:
+    """Return ln p(joined)/p(apart) (E,) of links between pieces; what no link is of is not filtered."""
+    if not len(tail):
+        return np.zeros(0)
+    (tails, i), (heads, j) = (np.unique(nodes, return_inverse=True) for nodes in (tail, head))
+    seen, scene = recording.measured, recording.scene
+    ends = ends_of(seen, _columns([members[k] for k in tails], from_end=True), scene, c)
+    begun = beginnings_of(seen, _columns([members[k] for k in heads], from_end=False), scene, c)
+    return log_ratio(ends, i.reshape(-1), begun, j.reshape(-1), scene, c)
 
 
 def _with_causal(
@@ -180,12 +227,13 @@ def _only_links(links: Links, chosen: BoolArray, nodes: int) -> IntArray:
     return cover
 
 
-def _log_odds(p: FloatArray) -> FloatArray:
+def log_odds(p: FloatArray) -> FloatArray:
+    """Return ln p/(1 − p) (N,) of posteriors (N,), which are kept from 0 and 1."""
     p = np.clip(p, _LEAST, 1.0 - _LEAST)
     return np.log(p / (1.0 - p))
 
 
-def _members(piece: IntArray) -> list[IntArray]:
+def members_of(piece: IntArray) -> list[IntArray]:
     """Return the detections of each piece in order of time; those below 0 are none."""
     order = np.argsort(piece, kind="stable")
     bounds = np.searchsorted(piece[order], np.arange(int(piece.max(initial=-1)) + 2))
@@ -205,7 +253,8 @@ def _columns(members: list[IntArray], *, from_end: bool) -> IntArray:
     return out
 
 
-def _at_rim(boxes: FloatArray, picture: tuple[float, float]) -> BoolArray:
+def at_rim(boxes: FloatArray, picture: tuple[float, float]) -> BoolArray:
+    """Tell of boxes (N, 4), left, top, right, bottom, whether they lie at the rim of a picture (N,)."""
     rim = _RIM * (boxes[:, 2:] - boxes[:, :2]).min(axis=1)[:, None]
     near: BoolArray = (boxes[:, :2] < rim) | (boxes[:, 2:] > np.asarray(picture) - rim)
     return np.asarray(near.any(axis=1))
@@ -232,7 +281,7 @@ def _candidates(seen: MeasuredBoxes, first: IntArray, last: IntArray) -> tuple[I
     return np.concatenate(tails), np.concatenate(heads)
 
 
-def _with_weak(seen: MeasuredBoxes, causal: IntArray, piece: IntArray, chain: IntArray) -> IntArray:
+def with_weak(seen: MeasuredBoxes, causal: IntArray, piece: IntArray, chain: IntArray) -> IntArray:
     """Return the chain (N,) of each detection, with those of weak pieces as the causal pass has them.
 
     They go with the detection before them on their causal track, or where there is none with the one behind;
@@ -311,8 +360,10 @@ def _named(chain: IntArray, causal: IntArray, most: int) -> IntArray:
     return name[code.reshape(-1)]
 
 
-def _drawn(links: Links, cover: IntArray) -> tuple[IntArray, FloatArray]:
+def drawn_covers(links: Links, cover: IntArray) -> tuple[IntArray, FloatArray]:
     """Return covers drawn by their probability, and the share (E,) of them that has each link."""
+    if not len(links.gain):
+        return cover[None], np.zeros(0)
     numbers = np.full(len(links.gain), -1)
     likely = links.gain > _LEAST_DRAWN
     likely[cover[cover >= 0]] = True
@@ -327,7 +378,7 @@ def _drawn(links: Links, cover: IntArray) -> tuple[IntArray, FloatArray]:
     return whole, shares(whole, len(links.gain))
 
 
-def _together(drawn: IntArray, links: Links, chain: IntArray, members: list[IntArray]) -> FloatArray:
+def together(drawn: IntArray, links: Links, chain: IntArray, members: list[IntArray]) -> FloatArray:
     """Return how often each piece (P,) is drawn in one chain with the longest piece of its own chain."""
     length = np.array([len(one) for one in members])
     order = np.lexsort((np.arange(len(length)), -length, chain))

@@ -33,10 +33,7 @@ class IdentityLog:
             taken: which tracks took their detections (M,), in the same order.
             kept: (M,) which of these count; None where all do. The others are left out.
         """
-        if kept is not None:
-            ends = np.cumsum([len(scan) for scan in batch])
-            batch = [_where(scan, own) for scan, own in zip(batch, np.split(kept, ends[:-1]), strict=True)]
-            taken = Pass(taken.assigned[kept], taken.real[kept])
+        batch, taken = counted(batch, taken, kept)
         self._scans += batch
         self._passes.append(taken)
         if len(self._scans) >= _SCANS_PER_PART:
@@ -84,6 +81,15 @@ class IdentityLog:
         taken = _joined(self._passes, _order_of(t, names))
         self._parts.append((Detections.from_scans(self._scans), taken))
         self._scans, self._passes = [], []
+
+
+def counted(batch: Sequence[Scan], taken: Pass, kept: BoolArray | None) -> tuple[list[Scan], Pass]:
+    """Return the scans of a step and who took their detections (M,), without those that do not count."""
+    if kept is None:
+        return list(batch), taken
+    ends = np.cumsum([len(scan) for scan in batch])
+    scans = [_where(scan, own) for scan, own in zip(batch, np.split(kept, ends[:-1]), strict=True)]
+    return scans, Pass(taken.assigned[kept], taken.real[kept])
 
 
 def _where(scan: Scan, keep: BoolArray) -> Scan:

@@ -33,6 +33,8 @@ def retrack(
 
     Causal tracks that no decision changes are tracked as they were: their rows are those that they have
     without one. The others follow what was decided; a track of no identity that begins beside has no rows.
+    Where such an identity has no row, but its detections' causal track has, it has that, in the last piece:
+    what was cut off from a track begins anew, with nothing to say for it, and would be believed later.
 
     Args:
         detections: all scans, with boxes in the common picture.
@@ -44,18 +46,93 @@ def retrack(
     owner, t = decision.owner, np.repeat(detections.scan_t, np.diff(detections.scan_start))
     changed = np.ones(len(owner), dtype=bool) if from_scratch else changed_tracks(decision)
     above = max(int(owner.max(initial=0)), int(decision.causal.max(initial=0)))
-    along = [] if from_scratch else [_Along(like, above, np.where(changed, 0, decision.causal))]
+    causal = None if from_scratch else _Along(like, above, decision.causal)
+    forced = None
     if from_scratch or changed.any():
         given = np.stack([np.where(owner > 0, owner, -1), _more_to_come(owner, t), later], axis=1)
-        along.append(_Along(like, above, np.where(changed, owner, 0), given))
-    done = 0
+        forced = _Along(like, above, np.where(changed, owner, 0), given)
+    both, table = [one for one in (causal, forced) if one is not None], _Table(t, decision, changed)
     for number, (rows, batch) in enumerate(steps(detections)):
-        for one in along:
+        for one in both:
             one.take(rows, batch)
-        done = rows.stop
         if number % STEPS_PER_PIECE == STEPS_PER_PIECE - 1:
-            yield _with_causal(_together([one.drain() for one in along]), t[:done], along, decision)
-    yield _with_causal(_together([one.finish() for one in along]), t[:done], along, decision)
+            drained = [None if one is None else one.drain() for one in (causal, forced)]
+            yield table.piece(drained[0], drained[1], forced, rows.stop)
+    finished = [None if one is None else one.finish() for one in (causal, forced)]
+    yield _together([table.piece(finished[0], finished[1], forced, len(t)), *table.left()])
+
+
+class _Table:
+    """Puts rows of two trackers together.
+
+    Args:
+        t: (N,) time of each detection.
+        decision: who is who.
+        changed: (N,) whether its causal track is another one now.
+    """
+
+    def __init__(self, t: FloatArray, decision: IdentityDecision, changed: BoolArray) -> None:
+        self._t, self._decision, self._changed = t, decision, changed
+        self._name = np.where(decision.owner > 0, decision.owner, decision.causal)
+        self._beside: list[Trajectories] = []  # causal rows of tracks that follow what was decided
+        self._followed: list[tuple[IntArray, FloatArray]] = []  # identities and times of rows of these
+
+    def piece(
+        self, causal: Trajectories | None, followed: Trajectories | None, forced: _Along | None, done: int
+    ) -> Trajectories:
+        """Return rows that have become final.
+
+        Args:
+            causal: rows of the causal tracks.
+            followed: rows of those that follow what was decided,
+            forced: by this.
+            done: so many detections have been taken in.
+        """
+        parts = []
+        if causal is not None:
+            hit = _last_hits(causal, self._t[:done], self._decision.causal[:done])
+            owner, changed = self._decision.owner[hit], self._changed[hit]
+            told = replace(self._told(causal, hit), track_id=self._name[hit])
+            parts.append(told.take(~changed))
+            self._beside.append(told.take(changed & (owner > 0)))
+        if followed is not None and forced is not None:
+            parts.append(self._told(followed, _last_hits(followed, self._t[:done], forced.of_hit[:done])))
+            self._followed.append((followed.track_id, followed.t))
+        return _together(parts)
+
+    def left(self) -> list[Trajectories]:
+        """Return the causal rows of identities that have none of their own then."""
+        if not self._followed or not self._beside:
+            return []
+        beside = Trajectories.concatenate(self._beside)
+        ids, t = (np.concatenate(column) for column in zip(*self._followed, strict=True))
+        return [lacking(beside, ids, t)]
+
+    def _told(self, table: Trajectories, hit: IntArray) -> Trajectories:
+        """Return rows with the causal identity of the last detection of their track, and its probability."""
+        d = self._decision
+        return replace(table, causal_id=d.causal[hit], identity_probability=d.probability[hit])
+
+
+def _last_hits(table: Trajectories, t: FloatArray, of: IntArray) -> IntArray:
+    """Return the last detection (R,) of the track of each row up to its time.
+
+    Args:
+        table: rows.
+        t: (K,) times of the detections so far.
+        of: (K,) whose they are.
+    """
+    if not len(table):
+        return np.zeros(0, dtype=np.int64)
+    first = int(np.searchsorted(t, table.t.min() - LONGEST_GAP_S - 1.0))
+    number = len(t) - first
+    both_t, both_of = np.concatenate([t[first:], table.t]), np.concatenate([of[first:], table.track_id])
+    is_row = np.arange(len(both_t)) >= number
+    order = np.lexsort((is_row, both_t, both_of))
+    at = np.maximum.accumulate(np.where(is_row[order], -1, np.arange(len(order))))
+    last = np.empty(len(order), dtype=np.int64)
+    last[order] = order[at]
+    return np.asarray(first + last[number:], dtype=np.int64)
 
 
 def changed_tracks(decision: IdentityDecision) -> BoolArray:
@@ -69,6 +146,21 @@ def changed_tracks(decision: IdentityDecision) -> BoolArray:
     owner_parts = np.bincount(pairs[0], minlength=int(owner.max(initial=0)) + 1)
     owner_parts[0] = 0
     return np.asarray((causal_parts[causal] > 1) | (owner_parts[owner] > 1))
+
+
+def lacking(beside: Trajectories, track_id: IntArray, t: FloatArray) -> Trajectories:
+    """Return rows of identities and times that others have not, each once.
+
+    Args:
+        beside: these rows.
+        track_id: (R,) identities of the others,
+        t: (R,) and their times (s).
+    """
+    ids, times = np.concatenate([track_id, beside.track_id]), np.concatenate([t, beside.t])
+    order = np.lexsort((np.arange(len(ids)), times, ids))
+    first = np.r_[True, (np.diff(ids[order]) != 0) | (np.diff(times[order]) != 0)][: len(order)]
+    rows = order[first] - len(track_id)
+    return beside.take(np.sort(rows[rows >= 0]))
 
 
 class _Along:
@@ -130,29 +222,3 @@ def _more_to_come(owner: IntArray, t: FloatArray) -> IntArray:
     last[owner] = t
     more: BoolArray = (owner > 0) & (t < last[owner])
     return more.astype(np.int64)
-
-
-def _with_causal(
-    table: Trajectories, t: FloatArray, along: list[_Along], decision: IdentityDecision
-) -> Trajectories:
-    """Return rows with the causal identity of the last detection of their track, and its probability.
-
-    Args:
-        table: of smoothed rows.
-        t: (K,) times of the detections so far.
-        along: what tracked them; no identity is in two of these.
-        decision: who is who.
-    """
-    if not len(table):
-        return replace(table, causal_id=np.zeros(0, dtype=np.int64), identity_probability=np.zeros(0))
-    first = int(np.searchsorted(t, table.t.min() - LONGEST_GAP_S - 1.0))
-    number = len(t) - first
-    both_t = np.concatenate([*([t[first:]] * len(along)), table.t])
-    both_of = np.concatenate([*(one.of_hit[first : len(t)] for one in along), table.track_id])
-    is_row = np.arange(len(both_t)) >= number * len(along)
-    order = np.lexsort((is_row, both_t, both_of))
-    at = np.maximum.accumulate(np.where(is_row[order], -1, np.arange(len(order))))
-    last = np.empty(len(order), dtype=np.int64)
-    last[order] = order[at]
-    hit = first + last[number * len(along) :] % number
-    return replace(table, causal_id=decision.causal[hit], identity_probability=decision.probability[hit])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.data.trajectories import Trajectories
@@ -59,21 +59,38 @@ def _links(decision: IdentityDecision, t: FloatArray) -> IdentityLinks:
 
 def _recording(tracker: ModelTracker, detections: Detections) -> Recording:
     """Return what is known of detections at the end of the causal pass, in the model's own numbers."""
-    model, c = tracker._model, tracker.constants
-    if not isinstance(model, OneModel):
-        raise lacking(model.name, "does not say what it has learnt of the scene")
-    learnt, picture = model.learnt(), model.picture()
     count = np.diff(detections.scan_start)
-    numbers = np.array([tracker._engine_sensors.index(name) for name in detections.sensors], dtype=np.int64)
+    numbers = np.array([tracker.engine_sensors.index(name) for name in detections.sensors], dtype=np.int64)
     sensor = numbers[np.repeat(detections.scan_sensor, count)]
     boxes = np.concatenate(
         [detections.boxes[:, :2], detections.boxes[:, :2] + detections.boxes[:, 2:]], axis=1
     )
+    t = np.repeat(detections.scan_t, count)
+    measured, scene = measured_boxes(tracker, t, sensor, boxes)
+    return Recording(measured, np.unique(detections.scan_t), scene)
+
+
+def measured_boxes(
+    tracker: ModelTracker, t: FloatArray, sensor: IntArray, boxes: FloatArray
+) -> tuple[MeasuredBoxes, LearntScene]:
+    """Return detections as the model sees them, by what it has learnt so far, and that.
+
+    Args:
+        tracker: of the model.
+        t: (N,) times (s).
+        sensor: (N,) as the tracker counts them.
+        boxes: (N, 4) left, top, right, bottom in the common picture (px).
+    """
+    model, c = tracker._model, tracker.constants
+    if not isinstance(model, OneModel):
+        raise lacking(model.name, "does not say what it has learnt of the scene")
+    learnt, picture = model.learnt(), model.picture()
     assert picture is not None, "the model has one"
     ends = learnt.boxes_at_edge >= learnt.boxes_beyond
     known = tracker.config.input.picture == "given"
     edges = box_sides.at_edge(boxes, picture, c) & (ends & known)[sensor][:, None, None]
-    for k in range(len(numbers)):
+    boxes = boxes.copy()
+    for k in range(len(tracker.engine_sensors)):
         own = sensor == k
         boxes[own] = sensor_offsets.corrected(boxes[own], learnt.offsets[k])
     scene = LearntScene(
@@ -82,5 +99,4 @@ def _recording(tracker: ModelTracker, detections: Detections) -> Recording:
         learnt.log_scene_variance,
         picture,
     )
-    measured = MeasuredBoxes(np.repeat(detections.scan_t, count), sensor, boxes, edges)
-    return Recording(measured, np.unique(detections.scan_t), scene)
+    return MeasuredBoxes(t, sensor, boxes, edges), scene

@@ -1,0 +1,284 @@
+"""Smoothed rows of identities that are decided with a lag, while the recording goes on.
+
+Rows come from two smoothers: that of the causal tracker, for identities that are one causal track and all of
+it, and that of a second tracker that follows what was decided, for the others. An identity goes over to the
+second for good with the first detection that is not of its one causal track: rows up to the last detection
+before come from the first, those behind it from the second.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from jeat_graph.config.smoothing import LAGGED, SmootherConfig
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.detections import Scan
+from jeat_graph.data.identity_links import IdentityLinks
+from jeat_graph.data.trajectories import Trajectories
+from jeat_graph.tracking.identities.passes import Pass
+from jeat_graph.tracking.identities.retracking import lacking
+from jeat_graph.tracking.identities.windows import DecidedStep, LagDecider, no_links
+
+if TYPE_CHECKING:
+    from jeat_graph.tracking.model_tracker import ModelTracker
+
+# Labels of tracks that no identity has begin here.
+_NOBODY = 1 << 62
+# With a fixed lag a row is given out after two of it; what is older than so many lags says nothing more.
+_LAGS_KEPT = 4.0
+
+
+class _Said(NamedTuple):
+    """What was decided of detections (N,), in order of time: identity, causal track, probability."""
+
+    t: FloatArray
+    owner: IntArray
+    causal: IntArray
+    probability: FloatArray
+
+    def take(self, rows: IntArray | BoolArray) -> _Said:
+        return _Said(self.t[rows], self.owner[rows], self.causal[rows], self.probability[rows])
+
+
+class _Whole:
+    """Which identities are one causal track each, and until when; by causal track and by identity."""
+
+    def __init__(self) -> None:
+        self.of_causal: dict[
+            int, tuple[int, float]
+        ] = {}  # identity, and the last time at which it was so (s)
+        self.causal_of: dict[int, int] = {}
+        self.since: dict[int, float] = {}  # identities that are followed: behind which time (s)
+        self.last: dict[int, float] = {}  # last detection of each identity (s)
+
+    def note(self, owner: int, causal: int, t: float) -> None:
+        """Take note of a detection that was decided; owner is 0 for nobody's."""
+        known = self.of_causal.get(causal)
+        if owner and owner not in self.last and known is None:
+            self.of_causal[causal], self.causal_of[owner] = (owner, math.inf), causal
+        elif not owner or self.causal_of.get(owner) != causal:
+            if known is None:
+                self.of_causal[causal] = (owner, -math.inf)
+            else:
+                self._part(known[0])
+            if owner:
+                self._part(owner)
+        if owner:
+            self.last[owner] = t
+
+    def _part(self, owner: int) -> None:
+        """Have an identity be followed from now on."""
+        if owner in self.since or not owner:
+            return
+        self.since[owner] = self.last.get(owner, -math.inf)
+        causal = self.causal_of.pop(owner, None)
+        if causal is not None:
+            self.of_causal[causal] = (owner, self.since[owner])
+
+    def forget(self, causal: set[int], owners: set[int]) -> None:
+        """Forget all but some."""
+        self.of_causal = {k: one for k, one in self.of_causal.items() if k in causal}
+        self.causal_of = {k: one for k, one in self.causal_of.items() if k in owners}
+        self.since = {k: one for k, one in self.since.items() if k in owners}
+        self.last = {k: one for k, one in self.last.items() if k in owners}
+
+
+class LagSmoother:
+    """Decides who is who with a lag, and makes the smoothed table of it.
+
+    Memory is bounded by what is in view where rows are fetched and the smoother has a fixed lag.
+
+    Args:
+        settings: of the smoother; its `lag_s` is how much of the future is in view at least.
+
+    Attributes:
+        logs_links: whether links are kept, for `links`.
+    """
+
+    def __init__(self, settings: SmootherConfig) -> None:
+        self.logs_links = True
+        self._lag_s, self._has_lag = settings.lag_s, settings.engine in LAGGED
+        self._decider = LagDecider(settings.lag_s)
+        self._follower: ModelTracker | None = None
+        self._label: dict[int, int] = {}  # of the follower's living tracks
+        self._whole = _Whole()
+        self._living: IntArray = np.zeros(0, dtype=np.int64)
+        self._waiting: list[Trajectories] = []  # causal rows, before it is decided whose they are
+        self._beside: list[Trajectories] = []  # causal rows of identities that are followed
+        self._followed: list[tuple[IntArray, FloatArray]] = []  # identities and times of rows of these
+        self._decided_s = -math.inf  # time of the last step that is decided
+        self._leapt = False  # whether time has gone on from another moment since rows were given out
+        self._said: list[_Said] = []
+        self._links: list[IdentityLinks] = []
+
+    def note(self, batch: Sequence[Scan], taken: Pass, living: IntArray, tracker: ModelTracker) -> None:
+        """Take in a step of the tracker.
+
+        Args:
+            batch: its scans.
+            taken: who took their detections (M,), by the identities that rows have.
+            living: (N,) these of the tracks after it.
+            tracker: that took it.
+        """
+        self._living = living
+        self._decider.add(batch, taken)
+        if self._decider.is_due():
+            self._decide(tracker)
+
+    def links(self) -> IdentityLinks:
+        """Return the links that were decided so far, in the order in which they were."""
+        parts = [no_links(), *self._links]
+        return IdentityLinks(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+    def reset(self, tracker: ModelTracker, t: float) -> None:
+        """Decide all that came, and let time go on from another moment (s)."""
+        self._decide(tracker, final=True)
+        self._decider.reset()
+        self._leapt = True
+        if self._follower is not None:
+            self._follower.reset(t)
+
+    def drain(self, causal: Trajectories) -> Trajectories:
+        """Return the rows that have become final, given those of the causal smoother that have."""
+        followed = [] if self._follower is None else [self._follower.drain_smoothed()]
+        limit = self._decided_s - _LAGS_KEPT * self._lag_s if self._has_lag else -math.inf
+        out = self._rows(causal, followed, math.inf if self._leapt else limit)
+        self._leapt = False
+        self._forget()
+        return out
+
+    def finish(self, tracker: ModelTracker, causal: Trajectories) -> Trajectories:
+        """Decide the rest and return all rows that are left."""
+        self._decide(tracker, final=True)
+        followed = [] if self._follower is None else [self._follower.finish()]
+        return self._rows(causal, followed, math.inf)
+
+    def settle(self) -> None:
+        """Have the second smoother be as one that was saved and loaded."""
+        if self._follower is not None:
+            self._follower.settle()
+
+    def _decide(self, tracker: ModelTracker, *, final: bool = False) -> None:
+        steps, links = self._decider.decide(tracker, final=final)
+        if self.logs_links and len(links.tail):
+            self._links.append(links)
+        for step in steps:
+            self._decided_s, count = step.t, len(step.owner)
+            self._said.append(_Said(np.full(count, step.t), step.owner, step.causal, step.probability))
+            for owner, causal in zip(step.owner.tolist(), step.causal.tolist(), strict=True):
+                self._whole.note(owner, causal, step.t)
+            self._follow(step, tracker)
+
+    def _follow(self, step: DecidedStep, tracker: ModelTracker) -> None:
+        """Give a step to the second tracker, with who is who."""
+        if self._follower is None:
+            self._follower = tracker.fresh_copy()
+        owners = np.where(step.owner > 0, step.owner, -1).astype(np.float64)
+        given = np.stack([owners, np.zeros(len(owners)), step.later], axis=1)
+        taken = self._follower.take_in(step.batch, given)
+        assert taken is not None, "it has a smoother"
+        assigned = self._follower.assigned(len(step.owner))
+        label = {one: self._label.get(one, _NOBODY + one) for one in taken.ids.tolist()}
+        for one, owner in zip(assigned.tolist(), step.owner.tolist(), strict=True):
+            if owner > 0:
+                label[one] = owner
+        self._label = label
+        self._follower.hand_over(taken._replace(given=np.array(list(label.values()), dtype=np.int64)))
+
+    def _rows(self, causal: Trajectories, followed: list[Trajectories], limit: float) -> Trajectories:
+        """Return the rows whose identity is decided, with that; the others wait.
+
+        Args:
+            causal: rows of the causal smoother.
+            followed: rows of the second one.
+            limit: before it the second one has given out all rows (s).
+        """
+        waiting = Trajectories.concatenate([*self._waiting, causal])
+        whole = self._whole
+        known = [whole.of_causal.get(one, (0, -math.inf)) for one in waiting.track_id.tolist()]
+        owner = np.array([one for one, _ in known], dtype=np.int64)
+        until = np.array([t for _, t in known])
+        last = np.array([whole.last.get(one, -math.inf) for one in owner.tolist()])
+        is_whole = np.isinf(until) & (until > 0.0)
+        undecided = np.where(is_whole, waiting.t > last, waiting.t > self._decided_s)
+        undecided |= ~np.isin(waiting.track_id, list(whole.of_causal)) & (waiting.t > self._decided_s)
+        kept = ~undecided & (waiting.t <= until) & (owner > 0)
+        parts = [replace(waiting.take(kept), track_id=owner[kept])]
+        self._beside.append(self._owned(waiting.take(~undecided & (waiting.t > until))))
+        self._waiting = [waiting.take(undecided)] if undecided.any() else []
+        for table in followed:
+            mine = table.take(table.track_id < _NOBODY)
+            since = np.array([whole.since.get(one, math.inf) for one in mine.track_id.tolist()])
+            parts.append(mine.take(mine.t > since))
+            self._followed.append((parts[-1].track_id, parts[-1].t))
+        parts.append(self._left(limit))
+        return self._with_causal(Trajectories.concatenate(parts))
+
+    def _owned(self, table: Trajectories) -> Trajectories:
+        """Return causal rows with the identity of their track's last detection; without those of nobody."""
+        said = self._all_said()
+        order = np.lexsort((said.t, said.causal))
+        owner = np.zeros(len(table), dtype=np.int64)
+        for one in np.unique(table.track_id).tolist():
+            low, high = np.searchsorted(said.causal[order], [one, one + 1]).tolist()
+            own, rows = order[low:high], np.flatnonzero(table.track_id == one)
+            at = np.searchsorted(said.t[own], table.t[rows], side="right") - 1
+            if len(own):
+                owner[rows] = np.where(at >= 0, said.owner[own[np.maximum(at, 0)]], 0)
+        return replace(table, track_id=owner).take(owner > 0)
+
+    def _left(self, limit: float) -> Trajectories:
+        """Return causal rows before a time (s) of identities that have none of the second smoother then."""
+        beside = Trajectories.concatenate(self._beside)
+        none = np.zeros(0, dtype=np.int64), np.zeros(0)
+        ids, t = (np.concatenate(column) for column in zip(none, *self._followed, strict=True))
+        self._beside, self._followed = [beside.take(beside.t >= limit)], [(ids[t >= limit], t[t >= limit])]
+        return lacking(beside.take(beside.t < limit), ids, t)
+
+    def _with_causal(self, table: Trajectories) -> Trajectories:
+        """Return rows, in order of time, with the causal identity of the last detection, and how sure."""
+        table = table.take(np.lexsort((table.track_id, table.t)))
+        said = self._all_said()
+        order = np.lexsort((said.t, said.owner))
+        owners = said.owner[order]
+        causal, probability = table.track_id.copy(), np.ones(len(table))
+        for one in np.unique(table.track_id).tolist():
+            low, high = np.searchsorted(owners, [one, one + 1]).tolist()
+            if high > low:
+                rows = np.flatnonzero(table.track_id == one)
+                own = order[low:high]
+                at = np.searchsorted(said.t[own], table.t[rows], side="right") - 1
+                of = own[np.maximum(at, 0)]
+                causal[rows], probability[rows] = said.causal[of], said.probability[of]
+        return replace(table, causal_id=causal, identity_probability=probability)
+
+    def _all_said(self) -> _Said:
+        if len(self._said) != 1:
+            none = np.zeros(0, dtype=np.int64)
+            parts = [_Said(np.zeros(0), none, none, np.zeros(0)), *self._said]
+            self._said = [_Said(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))]
+        return self._said[0]
+
+    def _forget(self) -> None:
+        """Forget what no row can be of any more."""
+        causal, owners = self._decider.in_view()
+        causal |= set(self._living.tolist())
+        for table in self._waiting:
+            causal |= set(table.track_id.tolist())
+        owners |= {one for one in self._label.values() if one < _NOBODY}
+        owners |= {one for table in self._beside for one in table.track_id.tolist()}
+        owners |= {self._whole.of_causal[one][0] for one in causal if one in self._whole.of_causal}
+        self._whole.forget(causal, owners)
+        said = self._all_said()
+        keep = np.isin(said.owner, list(owners))
+        if self._has_lag and len(said.t):
+            last = np.zeros(len(keep), dtype=np.bool_)
+            order = np.lexsort((said.t, said.owner))
+            last[order] = np.r_[np.diff(said.owner[order]) != 0, True]
+            keep &= last | (said.t > said.t[-1] - _LAGS_KEPT * self._lag_s)
+        self._said = [said.take(keep)]
