@@ -51,7 +51,7 @@ from jeat_graph.tracking.one_at_a_time import OneAtATime, one_at_a_time
 from jeat_graph.tracking.pending_step import PendingStep
 from jeat_graph.tracking.prediction import Prediction, of_motion, still_there, time_from
 from jeat_graph.tracking.record_smoothing import unsmoothed
-from jeat_graph.tracking.scans import ScanLike, as_scans, gather, sensor_index, sensors_of
+from jeat_graph.tracking.scans import ScanLike, as_scans, gather, sensor_index, sensors_of, surest_motion
 from jeat_graph.tracking.sensor_state import SensorState
 from jeat_graph.tracking.smoothed_instants import SmoothedInstants
 from jeat_graph.tracking.smoothed_tables import SmoothedTables
@@ -63,12 +63,6 @@ _MOST_SENSORS = 63
 _MOST_SIMILARITY = 4.0
 _NO_BOXES: IntArray = np.zeros(0, dtype=np.int64)
 _FINISHED = "this tracker has been finished; make another one for another recording"
-
-
-def _surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
-    """Return the camera's motion (11,) of the scan that knows it best; None if none does."""
-    measured = [scan.camera_motion for scan in batch if scan.camera_motion is not None]
-    return min(measured, key=lambda one: float(one[7] + one[8])) if measured else None
 
 
 @one_at_a_time(
@@ -256,7 +250,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         compared = None if embeddings is None else self._compare(embeddings, sensors_of(batch, codes))
         similarity = None if compared is None else compared.log_ratio[:, found.order]
         given = None if owners is None else owners[found.order]
-        self._model.take(StepInput(t, *found[:4], similarity, _surest_motion(batch), given))
+        self._model.take(StepInput(t, *found[:4], similarity, surest_motion(batch), given))
         self._order, self._given, self._causal = found.order, count, None
         if self._log is not None:
             self._log.add(batch, took(self, count), kept)
@@ -269,13 +263,6 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         if compared is not None:
             detection = np.arange(count, dtype=np.int64)
             self._appearance = remember(compared, self.assigned(count), detection, self._model.identities())
-
-    def hand_over(self, taken: PendingStep | None) -> None:
-        """Give the smoothers what a step took in; in order of time, and once."""
-        if taken is not None:
-            self._instants.note(taken.t)
-            self._model.hand_over(taken.record, taken.given, taken.label, taken.share)
-            self._decide_later(taken.batch, taken.ids, taken.given)
 
     def snapshot(self) -> ModelSnapshot:
         """Copy all that the next step depends on; the smoothers are not part of it."""

@@ -126,3 +126,9 @@ def sensor_index(name: str, names: Sequence[str]) -> int:
         '(in Python load_config("default", [...]) of the same text)'
     )
     raise UnknownSensorError(f"sensor {name!r} is not declared in the configuration; {hint}")
+
+
+def surest_motion(batch: Sequence[Scan]) -> FloatArray | None:
+    """Return the camera's motion (11,) of the scan that knows it best; None if none does."""
+    measured = [scan.camera_motion for scan in batch if scan.camera_motion is not None]
+    return min(measured, key=lambda one: float(one[7] + one[8])) if measured else None

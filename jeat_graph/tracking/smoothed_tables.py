@@ -21,6 +21,8 @@ from jeat_graph.tracking.identities.lagging import LagSmoother
 from jeat_graph.tracking.identities.log import IdentityLog
 from jeat_graph.tracking.identities.passes import Pass
 from jeat_graph.tracking.identities.whole import decided
+from jeat_graph.tracking.pending_step import PendingStep
+from jeat_graph.tracking.smoothed_instants import SmoothedInstants
 
 if TYPE_CHECKING:
     from jeat_graph.tracking.model_tracker import ModelTracker
@@ -40,6 +42,7 @@ class SmoothedTables:
         _log: IdentityLog | None
         _lag: LagSmoother | None
         _links: IdentityLinks | None
+        _instants: SmoothedInstants
 
         def _smoothed_table(self, rows: ModelRows) -> Trajectories:
             """Return rows of the smoother as a table."""
@@ -73,6 +76,13 @@ class SmoothedTables:
             return Trajectories.empty(self.sensor_names)
         rows = self._smoothed_table(self._model.drain())
         return rows if self._lag is None else self._lag.drain(rows)
+
+    def hand_over(self, taken: PendingStep | None) -> None:
+        """Give the smoothers what a step took in; in order of time, and once."""
+        if taken is not None:
+            self._instants.note(taken.t)
+            self._model.hand_over(taken.record, taken.given, taken.label, taken.share)
+            self._decide_later(taken.batch, taken.ids, taken.given)
 
     def settle(self) -> None:
         """Have the smoother be as one that was saved and loaded."""

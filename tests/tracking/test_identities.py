@@ -383,6 +383,6 @@ def test_what_is_cut_off_keeps_the_rows_of_the_track_that_it_was_of():
     assert sorted(rows.t.tolist()) == causal.t.tolist()
     assert (rows.track_id == np.where(rows.t < 2.0, 1, 2)).all()
     followed = Trajectories.concatenate(
-        list(retrack(detections, decision, np.full(80, 0.5), tracker, anew=True))
+        list(retrack(detections, decision, np.full(80, 0.5), tracker, from_scratch=True))
     )
     assert len(followed) < len(rows)  # what the model alone believes
