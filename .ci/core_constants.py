@@ -31,6 +31,10 @@ CONSTANTS: dict[str, dict[str, dict[str, str]]] = {
             "kTicksPerS": "_TICKS_PER_S",
             "kLeastPerspective": "_LEAST_PERSPECTIVE",
         },
+        "jeat_graph.filters.sensor_accuracy": {
+            "kSweeps": "_SWEEPS",
+            "kLeastShare": "_LEAST_SHARE",
+        },
         "jeat_graph.filters.visibility": {
             "kVisible": "VISIBLE",
             "kHidden": "HIDDEN",

@@ -15,10 +15,12 @@ class ArrayTable:
     """Base of frozen dataclasses whose fields are arrays of N rows, or tables of these.
 
     Attributes:
-        PER_SENSOR: names of the fields (N, S, ...) that have one column a sensor.
+        PER_SENSOR: names of the fields (N, S, ...) that have one column a sensor,
+        PER_PAIR: and of those (N, S, S, ...) that have one a pair.
     """
 
     PER_SENSOR: ClassVar[frozenset[str]] = frozenset()
+    PER_PAIR: ClassVar[frozenset[str]] = frozenset()
 
     def columns(self) -> dict[str, Any]:
         """Return the fields by name."""
@@ -51,8 +53,13 @@ class ArrayTable:
         wide = {
             name: column.widened()
             if isinstance(column, ArrayTable)
-            else np.pad(column, ((0, 0), (0, 1), *[(0, 0)] * (column.ndim - 2)))
+            else np.pad(column, ((0, 0), (0, 1), *self._behind(name, column.ndim - 2)))
             for name, column in self.columns().items()
-            if isinstance(column, ArrayTable) or name in self.PER_SENSOR
+            if isinstance(column, ArrayTable) or name in self.PER_SENSOR | self.PER_PAIR
         }
         return replace(self, **wide)
+
+    def _behind(self, name: str, dimensions: int) -> list[tuple[int, int]]:
+        """Return how the dimensions of a column behind that of the sensors widen."""
+        pair = name in self.PER_PAIR
+        return [(0, 1)] * pair + [(0, 0)] * (dimensions - pair)

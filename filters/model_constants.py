@@ -51,6 +51,13 @@ class ModelConstants:
         offset_count: pairs of boxes that the prior of two sensors' mean difference counts for.
         offset_clip: difference from the mean (sizes, or ln size) from which on a pair counts for less.
         offset_age_s: boxes of two sensors that are further apart in time are not compared (s).
+        lasting_after_s: two differences of a track that are further apart have in common what lasts (s).
+        lasting_within_s: and no further apart than this.
+        lasting_clip: largest difference that counts (sizes, or ln size).
+        lasting_count: pairs of differences that the prior of no such error counts for.
+        lasting_boxes: boxes in the filter's memory, over which such an error is not averaged out.
+        compared_std: least standard deviation of a side of a sensor that others are compared with (sizes): of
+            the common frame.
         gate: largest squared Mahalanobis distance of four sides: so far out that clutter is always likelier.
         clutter_size_area: area in (ln width, ln height) over which the sizes of leftover boxes spread.
         clutter_memory: share of the running mean of leftovers that a scan keeps.
@@ -170,6 +177,12 @@ class ModelConstants:
     offset_count: float = 10.0
     offset_clip: float = 0.2
     offset_age_s: float = 0.011
+    lasting_after_s: float = 0.5
+    lasting_within_s: float = 5.0
+    lasting_clip: float = 0.3
+    lasting_count: float = 20.0
+    lasting_boxes: float = 4.0
+    compared_std: float = 0.1
 
     gate: float = 150.0
     clutter_size_area: float = 2.0

@@ -57,6 +57,7 @@ class SensorBelief(NamedTuple):
         agreed_mean, agreed_std: (S,) mean and standard deviation of its scores (logits) of tracks that
             another sensor finds as well.
         agreed_share: (S,) how far these are believed, 0 before any.
+        score_weight: (S,) what its scores are worth, as the user says; 1 where he says nothing.
         noise_share: prior share ν of noise among what is not real.
     """
 
@@ -68,6 +69,7 @@ class SensorBelief(NamedTuple):
     agreed_mean: FloatArray
     agreed_std: FloatArray
     agreed_share: FloatArray
+    score_weight: FloatArray
     noise_share: float
 
 
@@ -124,7 +126,7 @@ def initial_sensor(c: ModelConstants) -> SensorBelief:
     one = np.ones(1)
     shares = c.p_detect * one, c.unseen_share * one, c.stationary_unseen_share * one
     return SensorBelief(
-        *shares, 0.0 * one, 0.0 * one, 0.0 * one, c.agreed_std * one, 0.0 * one, c.noise_share
+        *shares, 0.0 * one, 0.0 * one, 0.0 * one, c.agreed_std * one, 0.0 * one, one, c.noise_share
     )
 
 
@@ -137,9 +139,9 @@ def beta_binomial(
 
 
 def score_log_odds(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> FloatArray:
-    """Return η (N, S): the track's score less θ, once a track, times `testimony`; 0 where never found."""
+    """Return η (N, S): the track's score less θ, times its weights, once a track; 0 where never found."""
     score = track_scores(evidence, c)
-    given = score - sensors.decision_threshold
+    given = sensors.score_weight * (score - sensors.decision_threshold)
     weighed = np.where(given > 0.0, given * testimony(evidence, score, sensors, c), given)
     return np.where(evidence.found, weighed, 0.0)
 
@@ -327,6 +329,7 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
             agreed_mean=agreed[0],
             agreed_std=agreed[1],
             agreed_share=agreed[2],
+            score_weight=sensors.score_weight,
             noise_share=float(np.clip(noise, *c.noise_bounds)),
         )
     return sensors

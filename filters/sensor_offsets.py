@@ -56,9 +56,14 @@ def differences(boxes: FloatArray, others: FloatArray, moved: FloatArray) -> Flo
     return np.concatenate([centre / np.sqrt(size * other_size), np.log(size / other_size)], axis=1)
 
 
+def mean_difference(sums: OffsetSums, sensor: int, other: int, c: ModelConstants) -> FloatArray:
+    """Return what a sensor's boxes differ by from those of another one, on the average (4,)."""
+    return np.asarray(sums.total[sensor, other] / (sums.weight[sensor, other] + c.offset_count))
+
+
 def count(sums: OffsetSums, sensor: int, other: int, d: FloatArray, c: ModelConstants) -> OffsetSums:
     """Return the sums with differences d (K, 4) of a sensor from another one."""
-    expected = sums.total[sensor, other] / (sums.weight[sensor, other] + c.offset_count)
+    expected = mean_difference(sums, sensor, other, c)
     far = np.abs(d - expected).max(axis=1, initial=0.0)
     share = np.minimum(1.0, c.offset_clip / np.maximum(far, _LEAST))
     weight, total = sums.weight.copy(), sums.total.copy()
@@ -68,10 +73,10 @@ def count(sums: OffsetSums, sensor: int, other: int, d: FloatArray, c: ModelCons
     return OffsetSums(weight, total)
 
 
-def offsets(sums: OffsetSums, log_side_variance: FloatArray, c: ModelConstants) -> FloatArray:
+def offsets(sums: OffsetSums, log_noise: FloatArray, c: ModelConstants) -> FloatArray:
     """Return by how much each sensor's boxes (S, 4) are off the common frame: centres in sizes, ln sizes."""
     mean = sums.total / (sums.weight + c.offset_count)[..., None]
-    precision = np.exp(-log_side_variance) * (sums.weight.sum(axis=1) > 0.0)
+    precision = np.exp(-log_noise) * (sums.weight.sum(axis=1) > 0.0)
     share = precision / max(float(precision.sum()), _LEAST)
     return np.asarray((mean * share[None, :, None]).sum(axis=1))
 

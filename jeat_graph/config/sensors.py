@@ -40,6 +40,17 @@ class SensorConfig(Section):
         1.0,
         open_low=True,
     )
+    score_weight: float = number(
+        1.0, "1", "what its scores are worth as evidence for or against an object; 0: nothing", 0.0, 10.0
+    )
+    lasting_error: float | None = number(
+        None,
+        "1",
+        "standard deviation of what its boxes are off as long as they show one object, as a share of its "
+        "size; without it that is learnt from other sensors",
+        0.0,
+        1.0,
+    )
     sigma_px: float = number(3.0, "px", "engine `paper`: standard deviation of a box's centre", open_low=True)
     sigma_log_size: float = number(
         0.1, "ln px", "engine `paper`: standard deviation of ln width and ln height", open_low=True

@@ -19,6 +19,9 @@ inline constexpr int kStates = 7;
 inline constexpr int kMotion = 5;
 inline constexpr double kTicksPerS = 1000000.0;
 inline constexpr double kLeastPerspective = 1e-06;
+// filters.sensor_accuracy
+inline constexpr int kSweeps = 50;
+inline constexpr double kLeastShare = 1e-12;
 // filters.visibility
 inline constexpr int kVisible = 0;
 inline constexpr int kHidden = 1;
@@ -128,6 +131,12 @@ inline constexpr double kLongestAgoS = 1000000000.0;
     JEAT_ONE(offset_count) \
     JEAT_ONE(offset_clip) \
     JEAT_ONE(offset_age_s) \
+    JEAT_ONE(lasting_after_s) \
+    JEAT_ONE(lasting_within_s) \
+    JEAT_ONE(lasting_clip) \
+    JEAT_ONE(lasting_count) \
+    JEAT_ONE(lasting_boxes) \
+    JEAT_ONE(compared_std) \
     JEAT_ONE(gate) \
     JEAT_ONE(clutter_size_area) \
     JEAT_ONE(clutter_memory) \

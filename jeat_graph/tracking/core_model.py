@@ -21,7 +21,7 @@ from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import ModelRows
 from jeat_graph.smoothers.state_rts import FilterRecord
 from jeat_graph.tracking.engine import Moment, Recorded, StepInput
-from jeat_graph.tracking.one_model import Learnt, OneModel, even_logit_of
+from jeat_graph.tracking.one_model import Learnt, OneModel, given_of
 from jeat_graph.tracking.record_smoothing import by_gtsam, lag_of
 
 #: Under which name a saved state has what GTSAM smooths.
@@ -49,7 +49,7 @@ class CoreModel(OneModel):
 
     def declare_sensor(self, name: str, declared: SensorConfig) -> None:
         """Add a sensor that has had no scan yet."""
-        self._model.declare_sensor(even_logit_of(declared))
+        self._model.declare_sensor(*given_of(declared))
 
     def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time."""
@@ -148,9 +148,11 @@ class CoreModel(OneModel):
                 agreed_mean=column["agreed_mean"],
                 agreed_std=column["agreed_std"],
                 agreed_share=column["agreed_share"],
+                score_weight=column["score_weight"],
                 noise_share=float(column["noise_share"]),
             ),
             log_side_variance=column["log_side_variance"],
+            lasting_error=np.sqrt(column["lasting"]),
             log_scene_variance=float(column["log_scene_variance"]),
             leftovers=column["leftovers"],
             false_boxes=column["false_boxes"],

@@ -32,7 +32,8 @@ class Learnt(NamedTuple):
 
     Attributes:
         belief: of the sensors.
-        log_side_variance: (S,) ln of the variances of their boxes' sides.
+        log_side_variance: (S,) ln of the variances of their boxes' sides, as the filter takes them.
+        lasting_error: (S,) standard deviation of what of their errors lasts (sizes).
         log_scene_variance: the same of the scene; 0 before the first scan.
         leftovers: (S,) mean number of boxes in a scan that no track takes,
         false_boxes: (S,) and that are of nothing real.
@@ -44,6 +45,7 @@ class Learnt(NamedTuple):
 
     belief: SensorBelief
     log_side_variance: FloatArray
+    lasting_error: FloatArray
     log_scene_variance: float
     leftovers: FloatArray
     false_boxes: FloatArray
@@ -58,9 +60,15 @@ def row_output(c: ModelConstants) -> RowOutput:
     return RowOutput(partial(singer.reported_motion, c=c), partial(singer.reported_covariance, c=c))
 
 
-def even_logit_of(declared: SensorConfig) -> float:
-    """Return the logit of the score at which a box is as likely real as not; NaN where it is to be learnt."""
-    return math.nan if declared.even_score is None else float(logit(np.array(declared.even_score)))
+def given_of(declared: SensorConfig) -> tuple[float, float, float]:
+    """Return what a user says of a sensor, as engines take it.
+
+    The logit of the score at which a box is as likely real as not, NaN where it is to be learnt; the weight
+    of its scores; the variance of its lasting error (sizes²), NaN where it is to be learnt.
+    """
+    even = math.nan if declared.even_score is None else float(logit(np.array(declared.even_score)))
+    lasting = math.nan if declared.lasting_error is None else declared.lasting_error**2
+    return even, declared.score_weight, lasting
 
 
 class OneModel(SmoothsRecords):

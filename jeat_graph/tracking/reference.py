@@ -123,7 +123,7 @@ def step(
     state.tracks = replace(state.tracks, used=np.zeros_like(state.tracks.used))
     assigned, records = [np.zeros(0, dtype=np.int64) for _ in scans], []
     nis, noise_scale = [np.full(len(scan.boxes), np.nan) for scan in scans], [1.0 for _ in scans]
-    for place in order_of_scans(state, scans):
+    for place in order_of_scans(state, scans, c):
         given = scans[place]
         clock = begin_scan(state, t, given, c)
         dt = 0.0 if state.t is None else t - state.t
@@ -131,7 +131,7 @@ def step(
         scan = correct_boxes(state, given, c)
         follow_picture(state, scan, motion, step_s, c)
         follow_camera(state, scan, dt, c)
-        noise_scale[place] = math.exp(state.log_side_variance[given.sensor]) / c.side_std**2
+        noise_scale[place] = math.exp(state.log_noise(c)[given.sensor]) / c.side_std**2
         pairs = associate(state, scan, c)
         nis[place][pairs.box] = pairs.nis
         count_gaps(state, scan, pairs, c)
@@ -156,9 +156,10 @@ def step(
     return out
 
 
-def order_of_scans(state: ReferenceState, scans: Sequence[SensorScan]) -> list[int]:
+def order_of_scans(state: ReferenceState, scans: Sequence[SensorScan], c: ModelConstants) -> list[int]:
     """Return the places of scans: the most exact sensor first, equals by what they see."""
-    content = [(state.log_side_variance[s.sensor], s.logits.tolist(), s.boxes.tolist()) for s in scans]
+    noise = state.log_noise(c)
+    content = [(noise[s.sensor], s.logits.tolist(), s.boxes.tolist()) for s in scans]
     return sorted(range(len(scans)), key=content.__getitem__)
 
 
@@ -194,7 +195,7 @@ def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
     tracks = state.tracks
     F = singer.in_perspective(model.F, tracks.mean, dt, c)
     if dt > 0.0 and len(tracks):
-        noise = state.process_noise, state.log_scene_variance
+        noise = state.process_noise, state.log_scene_variance(c)
         own, moves = picture_motion.before_prediction(tracks.mean, state.camera_velocity)
         mean, covariance = singer.predict(own, tracks.covariance, model, F, *noise, c)
         mean = picture_motion.after_prediction(mean, moves, state.camera_velocity, dt)
@@ -211,7 +212,7 @@ def correct_boxes(state: ReferenceState, scan: SensorScan, c: ModelConstants) ->
     k = scan.sensor
     cuts = state.picture_known and bool(state.boxes_at_edge[k] >= state.boxes_beyond[k])
     edges = box_sides.at_edge(scan.boxes, state.picture, c) & cuts
-    offset = sensor_offsets.offsets(state.offsets, state.log_side_variance, c)[k]
+    offset = sensor_offsets.offsets(state.offsets, state.log_noise(c), c)[k]
     return scan._replace(boxes=sensor_offsets.corrected(scan.boxes, offset), edges=edges)
 
 
@@ -237,7 +238,7 @@ def follow_picture(
     )
     moved = (mean - tracks.mean)[sure, :, singer.POSITION]
     seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
-    noise = float(state.log_side_variance[scan.sensor])
+    noise = float(state.log_noise(c)[scan.sensor])
     if not camera_motion.contradicted(*seen, noise, moved, state.camera, c):
         state.tracks, state.camera_velocity = replace(tracks, mean=mean, covariance=covariance), velocity
 
@@ -254,7 +255,7 @@ def follow_camera(state: ReferenceState, scan: SensorScan, dt: float, c: ModelCo
     dt = singer.whole_microseconds(dt)
     if dt <= 0.0:
         return
-    tracks, noise = state.tracks, float(state.log_side_variance[scan.sensor])
+    tracks, noise = state.tracks, float(state.log_noise(c)[scan.sensor])
     sure = surely_there(state, c)
     seen = tracks.mean[sure], tracks.covariance[sure], scan.boxes
     motion, state.camera = camera_motion.estimate(*seen, noise, state.picture, dt, state.camera, c)
@@ -269,7 +270,7 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     """Find the boxes of tracks: the assignment of greatest log likelihood ratio."""
     tracks, k = state.tracks, scan.sensor
     p_detect = own_p_detect(tracks, state.sensors.p_detect, c)[:, k]
-    noise = float(state.log_side_variance[k])
+    noise = float(state.log_noise(c)[k])
     innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, scan.edges, noise, c)
     size = singer.expected_size(tracks.mean)
     density = likelihood_ratio.sides_log_density(innovation, size, c)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
-from jeat_graph.filters import box_sides, gap_survival, object_probability, sensor_offsets
+from jeat_graph.filters import box_sides, gap_survival, object_probability, sensor_accuracy, sensor_offsets
 from jeat_graph.filters.evidence import Evidence, ScanClock
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.picture_motion import CameraVelocity, with_velocity
@@ -36,7 +36,7 @@ def begin_tracks(
         among[logits[None] <= logits[:, None]] = 0.0
         overlap = np.maximum(overlap, among.max(axis=1))
     evidence = Evidence.of_births(clock.t, scan.sensor, state.num_sensors, logits, overlap, clock.weight)
-    noise = float(state.log_side_variance[scan.sensor]), state.log_scene_variance
+    noise = float(state.log_noise(c)[scan.sensor]), state.log_scene_variance(c)
     ids = np.arange(state.next_id, state.next_id + len(free), dtype=np.int64)
     mean, covariance = box_sides.initial_state(boxes, scan.edges[free], *noise, c)
     mean = with_velocity(mean, state.camera_velocity)
@@ -57,10 +57,32 @@ def compare_sensors(state: ReferenceState, given: SensorScan, assigned: IntArray
         if other != k and usable.any():
             moved = tracks.mean[row[usable], :, VELOCITY] * age[usable, None]
             d = sensor_offsets.differences(given.boxes[usable], before[usable], moved)
+            mean = sensor_offsets.mean_difference(state.offsets, k, other, c)
             state.offsets = sensor_offsets.count(state.offsets, k, other, d, c)
+            compare_errors(state, row[usable], k, other, sensor_accuracy.clipped(d, mean, c), c)
+    tracks = state.tracks
     last_box, last_box_s = tracks.last_box.copy(), tracks.last_box_s.copy()
     last_box[row, k], last_box_s[row, k] = given.boxes, state.time
     state.tracks = replace(tracks, last_box=last_box, last_box_s=last_box_s)
+
+
+def compare_errors(
+    state: ReferenceState, row: IntArray, k: int, other: int, d: FloatArray, c: ModelConstants
+) -> None:
+    """Count what lasts of the differences d (K, 4) of two sensors on tracks; keep d where the last is old."""
+    tracks = state.tracks
+    age = np.where(tracks.has_apart[row, k, other], state.time - tracks.apart_s[row, k, other], np.inf)
+    old = age >= c.lasting_after_s
+    pairs = old & (age <= c.lasting_within_s)
+    products = sensor_accuracy.products(d[pairs], tracks.apart[row[pairs], k, other])
+    state.accuracy = sensor_accuracy.count(state.accuracy, k, other, products)
+    apart, apart_s, has_apart = tracks.apart.copy(), tracks.apart_s.copy(), tracks.has_apart.copy()
+    apart[row[old], k, other], apart_s[row[old], k, other], has_apart[row[old], k, other] = (
+        d[old],
+        state.time,
+        True,
+    )
+    state.tracks = replace(tracks, apart=apart, apart_s=apart_s, has_apart=has_apart)
 
 
 def compare_overlaps(state: ReferenceState) -> None:
@@ -102,6 +124,10 @@ def learn(state: ReferenceState, t: float, c: ModelConstants) -> None:
     """Learn what the sensors are worth from tracks that live and from those that ended."""
     if t - state.learnt_s >= c.learn_period_s:
         state.learnt_s = t
+        p_detect = state.sensors.p_detect
+        sums, given = state.accuracy, state.given_lasting
+        lasting = sensor_accuracy.solve(sums, state.log_side_variance, p_detect, given, c)
+        state.accuracy = sums._replace(lasting=lasting)
         evidence = state.ended.append(state.tracks.evidence)
         state.sensors = object_probability.learn_sensors(evidence, state.sensors, c)
 

@@ -20,7 +20,7 @@ from jeat_graph.filters.singer import STATES
 from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import Called, ModelRows, joined, rows_of
 from jeat_graph.tracking.engine import LONGEST_SILENCE_S, Moment, Recorded, StepInput, lacking
-from jeat_graph.tracking.one_model import Learnt, OneModel, even_logit_of, row_output
+from jeat_graph.tracking.one_model import Learnt, OneModel, given_of, row_output
 from jeat_graph.tracking.reference import step
 from jeat_graph.tracking.reference_life import reset
 from jeat_graph.tracking.reference_state import ReferenceState, SensorScan, declare_sensor, initial_state
@@ -72,7 +72,7 @@ class ReferenceModel(OneModel):
 
     def declare_sensor(self, name: str, declared: SensorConfig) -> None:
         """Add a sensor that has had no scan yet."""
-        declare_sensor(self._state, self.constants, even_logit_of(declared))
+        declare_sensor(self._state, self.constants, *given_of(declared))
 
     def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time."""
@@ -217,11 +217,12 @@ class ReferenceModel(OneModel):
         state = self._state
         return Learnt(
             SensorBelief(*state.sensors),
-            state.log_side_variance,
-            state.log_scene_variance if state.t is not None else 0.0,
+            state.log_noise(self.constants),
+            np.sqrt(state.accuracy.lasting),
+            state.log_scene_variance(self.constants) if state.t is not None else 0.0,
             state.leftovers,
             state.false_boxes,
-            sensor_offsets.offsets(state.offsets, state.log_side_variance, self.constants),
+            sensor_offsets.offsets(state.offsets, state.log_noise(self.constants), self.constants),
             state.boxes_at_edge,
             state.boxes_beyond,
             state.process_noise,

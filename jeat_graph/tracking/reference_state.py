@@ -14,6 +14,7 @@ from jeat_graph.filters import (
     gap_survival,
     object_probability,
     score_calibration,
+    sensor_accuracy,
     sensor_offsets,
     singer,
 )
@@ -26,6 +27,7 @@ from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.object_probability import SensorBelief
 from jeat_graph.filters.picture_motion import CameraVelocity
 from jeat_graph.filters.score_calibration import RepeatCounts
+from jeat_graph.filters.sensor_accuracy import AccuracySums
 from jeat_graph.filters.sensor_offsets import OffsetSums
 from jeat_graph.filters.singer import STATES, ProcessNoise
 from jeat_graph.filters.visibility import seen
@@ -45,6 +47,9 @@ class ReferenceTracks(ArrayTable):
         last_box: (N, S, 4) the last box of each sensor (left, top, right, bottom in px), as it was given; 0
             before the first.
         last_box_s: (N, S) its time (s).
+        apart: (N, S, S, 4) what a sensor's box differed by from another's, less their mean difference,
+        apart_s: (N, S, S) its time (s),
+        has_apart: (N, S, S) and whether there was one.
         innovation: (N, 4) the last normalised innovation of centre and ln size.
         has_innovation: (N,) whether there was one.
         evidence: what the posterior rests on.
@@ -59,6 +64,7 @@ class ReferenceTracks(ArrayTable):
     PER_SENSOR: ClassVar[frozenset[str]] = frozenset(
         ("recent_hits", "recent_misses", "last_box", "last_box_s", "sees")
     )
+    PER_PAIR: ClassVar[frozenset[str]] = frozenset(("apart", "apart_s", "has_apart"))
 
     track_id: IntArray
     mean: FloatArray
@@ -68,6 +74,9 @@ class ReferenceTracks(ArrayTable):
     recent_misses: FloatArray
     last_box: FloatArray
     last_box_s: FloatArray
+    apart: FloatArray
+    apart_s: FloatArray
+    has_apart: BoolArray
     innovation: FloatArray
     has_innovation: BoolArray
     evidence: Evidence
@@ -94,6 +103,9 @@ class ReferenceTracks(ArrayTable):
             recent_misses=np.zeros((number, sensors)),
             last_box=np.zeros((number, sensors, SIDES)),
             last_box_s=np.zeros((number, sensors)),
+            apart=np.zeros((number, sensors, sensors, SIDES)),
+            apart_s=np.zeros((number, sensors, sensors)),
+            has_apart=np.zeros((number, sensors, sensors), dtype=np.bool_),
             innovation=np.zeros((number, SIDES)),
             has_innovation=np.zeros(number, dtype=np.bool_),
             evidence=evidence,
@@ -155,6 +167,7 @@ class ReferenceState:
         ended: evidence of the last tracks that ended. `end_tracks`
         learnt_s: when sensors were learnt last (s). `learn`
         offsets: what two sensors' boxes differ by. `compare_sensors`
+        accuracy: what lasts of the sensors' errors. `compare_sensors`, `learn`
         log_side_variance: (S,) ln ρ² of the sensors' sides. `learn_noise`
         leftovers: (S,) running mean of boxes a scan that no track takes. `count_clutter`
         false_boxes: (S,) the same of boxes that are of nothing real. `count_false_boxes`
@@ -165,6 +178,8 @@ class ReferenceState:
         repetition: of S sensors, which boxes come again. `begin_scan`
         even_logit: (S,) logit of the score at which the user says that a box is as likely real as not; NaN
             where it is learnt.
+        given_lasting: (S,) variance of what lasts of its errors, as the user says (sizes²); NaN where it is
+            learnt.
     """
 
     tracks: ReferenceTracks
@@ -180,6 +195,7 @@ class ReferenceState:
     ended: Evidence
     learnt_s: float
     offsets: OffsetSums
+    accuracy: AccuracySums
     log_side_variance: FloatArray
     leftovers: FloatArray
     false_boxes: FloatArray
@@ -189,6 +205,7 @@ class ReferenceState:
     boxes_beyond: FloatArray
     repetition: tuple[RepeatCounts, ...]
     even_logit: FloatArray
+    given_lasting: FloatArray
 
     @property
     def time(self) -> float:
@@ -196,10 +213,14 @@ class ReferenceState:
         assert self.t is not None, "tracks are predicted before anything else"
         return self.t
 
-    @property
-    def log_scene_variance(self) -> float:
-        """Mean of ln ρ² of the sensors that have looked: the scale of the errors that last."""
-        return float(self.log_side_variance[~np.isnan(self.last_scan_s)].mean())
+    def log_noise(self, c: ModelConstants) -> FloatArray:
+        """Return ln of the variances (S,) of the sensors' sides, as the filter takes them."""
+        compared = self.offsets.weight.sum(axis=1)
+        return sensor_accuracy.log_noise(self.log_side_variance, compared, self.accuracy.lasting, c)
+
+    def log_scene_variance(self, c: ModelConstants) -> float:
+        """Return the mean of these over sensors that have had a scan: the scale of lasting errors."""
+        return float(self.log_noise(c)[~np.isnan(self.last_scan_s)].mean())
 
     @property
     def num_sensors(self) -> int:
@@ -220,10 +241,11 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         camera=camera_motion.initial_variance(c),
         camera_velocity=CameraVelocity.none(),
         gaps=gap_survival.no_gaps(),
-        sensors=SensorBelief(none, none, none, none, none, none, none, none, c.noise_share),
+        sensors=SensorBelief(none, none, none, none, none, none, none, none, none, c.noise_share),
         ended=Evidence.none(0),
         learnt_s=-math.inf,
         offsets=sensor_offsets.no_offsets(),
+        accuracy=sensor_accuracy.no_accuracy(),
         log_side_variance=none,
         leftovers=none,
         false_boxes=none,
@@ -233,12 +255,20 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         boxes_beyond=none,
         repetition=(),
         even_logit=none,
+        given_lasting=none,
     )
 
 
-def declare_sensor(state: ReferenceState, c: ModelConstants, even_logit: float = math.nan) -> None:
+def declare_sensor(
+    state: ReferenceState,
+    c: ModelConstants,
+    even_logit: float = math.nan,
+    score_weight: float = 1.0,
+    lasting: float = math.nan,
+) -> None:
     """Add a sensor without a scan yet, of which what is usual is believed but for what the user says."""
     new, old = object_probability.initial_sensor(c), state.sensors
+    new = new._replace(score_weight=np.array([score_weight]))
     columns = (np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True))
     state.sensors = SensorBelief._make([*columns, old.noise_share])
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
@@ -252,3 +282,5 @@ def declare_sensor(state: ReferenceState, c: ModelConstants, even_logit: float =
     state.boxes_beyond = np.append(state.boxes_beyond, 0.0)
     state.repetition = (*state.repetition, score_calibration.no_repetition())
     state.even_logit = np.append(state.even_logit, even_logit)
+    state.given_lasting = np.append(state.given_lasting, lasting)
+    state.accuracy = sensor_accuracy.widened(state.accuracy, 0.0 if math.isnan(lasting) else lasting)

@@ -59,8 +59,9 @@ def sensors_of(
     noise=0.5,
     stationary_unseen=0.3,
     agreed=0.0,
+    weight=1.0,
 ):
-    values = (p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, 3.0, 0.8, agreed)
+    values = (p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, 3.0, 0.8, agreed, weight)
     rows = [np.full(number, value) for value in values]
     return op.SensorBelief(*rows, noise_share=noise)
 

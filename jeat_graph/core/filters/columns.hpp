@@ -38,4 +38,16 @@ template <class T> void widen_rows(std::vector<T>& column, std::size_t rows, std
     column = std::move(wide);
 }
 
+// One column more of each sensor, and of each pair of sensors, of zeros.
+template <class T> void widen_pairs(std::vector<T>& column, std::size_t rows, std::size_t sensors, std::size_t each) {
+    const std::size_t wide_sensors = sensors + 1;
+    std::vector<T> wide(rows * wide_sensors * wide_sensors * each, T{});
+    for (std::size_t line = 0; line < rows * sensors; ++line) {
+        const std::size_t to = (line / sensors * wide_sensors + line % sensors) * wide_sensors;
+        std::copy(column.begin() + line * sensors * each, column.begin() + (line + 1) * sensors * each,
+                  wide.begin() + to * each);
+    }
+    column = std::move(wide);
+}
+
 }  // namespace jeat::filters

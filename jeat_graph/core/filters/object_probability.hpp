@@ -12,7 +12,8 @@
 namespace jeat::filters {
 
 struct SensorBelief {
-    std::vector<double> p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share;
+    std::vector<double> p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share,
+        score_weight;
     double noise_share;
 
     void widen(const ModelConstants& c) {
@@ -24,6 +25,7 @@ struct SensorBelief {
         agreed_mean.push_back(0.0);
         agreed_std.push_back(c.agreed_std);
         agreed_share.push_back(0.0);
+        score_weight.push_back(1.0);
     }
 };
 
@@ -121,7 +123,7 @@ private:
     // A good score that the others contradict says as much as it resembles the scores that they agree with.
     double weighed_score(const Evidence& e, std::size_t row, std::size_t s) const {
         const std::size_t first = row * e.sensors;
-        const double z = score(e, first + s), given = z - sensors_.decision_threshold[s];
+        const double z = score(e, first + s), given = sensors_.score_weight[s] * (z - sensors_.decision_threshold[s]);
         const double below = (sensors_.agreed_mean[s] - z) / sensors_.agreed_std[s];
         if (!(given > 0.0) || !(sensors_.agreed_share[s] > 0.0) || !(below > 0.0)) return given;
         double alone = 1.0, silent = 0.0;

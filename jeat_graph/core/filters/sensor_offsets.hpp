@@ -7,6 +7,7 @@
 
 #include "constants.hpp"
 #include "filters/boxes.hpp"
+#include "filters/columns.hpp"
 #include "filters/model_constants.hpp"
 #include "math.hpp"
 
@@ -17,17 +18,16 @@ struct OffsetSums {
     std::vector<double> weight, total;  // (S, S), (S, S, 4)
 
     void widen() {
-        OffsetSums wide;
-        wide.sensors = sensors + 1;
-        wide.weight.assign(wide.sensors * wide.sensors, 0.0);
-        wide.total.assign(wide.weight.size() * 4, 0.0);
-        for (std::size_t i = 0; i < sensors; ++i)
-            for (std::size_t j = 0; j < sensors; ++j) {
-                wide.weight[i * wide.sensors + j] = weight[i * sensors + j];
-                for (int k = 0; k < 4; ++k)
-                    wide.total[(i * wide.sensors + j) * 4 + k] = total[(i * sensors + j) * 4 + k];
-            }
-        *this = std::move(wide);
+        widen_pairs(weight, 1, sensors, 1);
+        widen_pairs(total, 1, sensors, 4);
+        ++sensors;
+    }
+
+    // By how many pairs of boxes a sensor was compared with the others.
+    double compared(std::size_t i) const {
+        double sum = 0.0;
+        for (std::size_t j = 0; j < sensors; ++j) sum += weight[i * sensors + j];
+        return sum;
     }
 
     // The mean difference of two sensors so far.
@@ -53,15 +53,12 @@ struct OffsetSums {
     }
 
     // By how much a sensor's boxes are off the common frame.
-    std::array<double, 4> offset(std::size_t i, const std::vector<double>& log_side_variance,
-                                 const ModelConstants& c) const {
+    std::array<double, 4> offset(std::size_t i, const std::vector<double>& noise, const ModelConstants& c) const {
         double whole = 0.0;
         std::array<double, 4> out{};
         std::vector<double> precision(sensors, 0.0);
         for (std::size_t j = 0; j < sensors; ++j) {
-            double compared = 0.0;
-            for (std::size_t k = 0; k < sensors; ++k) compared += weight[j * sensors + k];
-            precision[j] = compared > 0.0 ? exp_of(-log_side_variance[j]) : 0.0;
+            precision[j] = compared(j) > 0.0 ? 1.0 / noise[j] : 0.0;
             whole += precision[j];
         }
         for (std::size_t j = 0; j < sensors; ++j) {

@@ -116,8 +116,8 @@ public:
 
     Exclusive use;
 
-    void declare_sensor(double even_logit) {
-        now_.state.declare_sensor(even_logit);
+    void declare_sensor(double even_logit, double score_weight, double lasting) {
+        now_.state.declare_sensor(even_logit, score_weight, lasting);
     }
 
     void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
@@ -304,6 +304,7 @@ public:
         out["agreed_mean"] = array_of(state.belief.agreed_mean);
         out["agreed_std"] = array_of(state.belief.agreed_std);
         out["agreed_share"] = array_of(state.belief.agreed_share);
+        out["score_weight"] = array_of(state.belief.score_weight);
         out["decision_threshold"] = array_of(state.belief.decision_threshold);
         out["prior_odds"] = array_of(state.belief.prior_odds);
         std::vector<double> leftovers;
@@ -319,10 +320,13 @@ public:
         out["boxes_beyond"] = array_of(beyond);
         out["noise_share"] = state.belief.noise_share;
         out["log_scene_variance"] = state.started ? state.log_scene_variance() : 0.0;
-        out["log_side_variance"] = array_of(state.log_side_variance);
+        std::vector<double> noise = state.noises();
+        for (double& variance : noise) variance = log_of(variance);
+        out["log_side_variance"] = array_of(noise);
+        out["lasting"] = array_of(state.accuracy.lasting);
         std::vector<double> offsets;
         for (std::size_t k = 0; k < state.sensors.size(); ++k) {
-            const auto offset = state.offsets.offset(k, state.log_side_variance, state.constants);
+            const auto offset = state.offsets.offset(k, state.noises(), state.constants);
             offsets.insert(offsets.end(), offset.begin(), offset.end());
         }
         out["offsets"] = array_of(offsets, 4);
@@ -426,9 +430,11 @@ void bind(nb::module_& module) {
              "constants: a ModelConstants; width, height: of the picture (px), if known; lag_s: of the smoother (s),\n"
              "infinite for whole tracks, negative for none.")
         .def("declare_sensor", exclusive(&Model::declare_sensor),
-             nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(),
+             nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(), nb::arg("score_weight") = 1.0,
+             nb::arg("lasting") = std::numeric_limits<double>::quiet_NaN(),
              "Add a sensor that has had no scan yet. even_logit: of the score at which a box is as likely real as not,\n"
-             "NaN where it is to be learnt.")
+             "NaN where it is to be learnt; score_weight: what its scores are worth; lasting: variance of what lasts of\n"
+             "its errors (sizes²), NaN where it is to be learnt.")
         .def("take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
              nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("similarity").noconvert() = nb::none(),
              nb::arg("motion").noconvert() = nb::none(), nb::arg("owners").noconvert() = nb::none(),

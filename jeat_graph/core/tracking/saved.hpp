@@ -142,7 +142,8 @@ void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_
 }
 
 template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix, Sensor& sensor) {
-    auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_scan_s, repetition, even_logit] = sensor;
+    auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_scan_s, repetition, even_logit,
+           given_lasting] = sensor;
     v.numbers(prefix + "leftovers", &leftovers, 1);
     v.numbers(prefix + "false_boxes", &false_boxes, 1);
     v.numbers(prefix + "boxes_at_edge", &boxes_at_edge, 1);
@@ -150,6 +151,7 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
     v.numbers(prefix + "period_s", &period_s, 1, Values::any);
     v.numbers(prefix + "last_scan_s", &last_scan_s, 1, Values::any);
     v.numbers(prefix + "even_logit", &even_logit, 1, Values::any);
+    v.numbers(prefix + "given_lasting", &given_lasting, 1, Values::any);
     auto& [boxes, repeated, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
     std::size_t rows = last_boxes.size();
     v.whole(prefix + "rows", rows);
@@ -164,7 +166,7 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
 
 template <class Visitor> void visit_state(Visitor& v, State& state) {
     auto& [constants, tracks, t, started, next_id, width, height, picture_known, process_noise, camera, camera_velocity, gaps,
-           belief, offsets, log_side_variance, sensors, ended, learnt_s] = state;
+           belief, offsets, accuracy, log_side_variance, sensors, ended, learnt_s] = state;
     (void)constants;  // the caller's
     std::size_t S = sensors.size(), rows = tracks.size(), ended_rows = ended.size();
     v.whole("sensors", S);
@@ -199,11 +201,12 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     auto& [gaps_ended, ended_well] = gaps;
     v.numbers("gaps.ended", gaps_ended.data(), gaps_ended.size());
     v.numbers("gaps.ended_well", ended_well.data(), ended_well.size());
-    auto& [p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share, noise_share] =
-        belief;
+    auto& [p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share, score_weight,
+           noise_share] = belief;
     v.column("belief.agreed_mean", agreed_mean, S, 1);
     v.column("belief.agreed_std", agreed_std, S, 1);
     v.column("belief.agreed_share", agreed_share, S, 1);
+    v.column("belief.score_weight", score_weight, S, 1);
     v.column("belief.p_detect", p_detect, S, 1);
     v.column("belief.unseen", unseen, S, 1);
     v.column("belief.stationary_unseen", stationary_unseen, S, 1);
@@ -214,6 +217,10 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     (void)offset_sensors;
     v.column("offsets.weight", weight, S * S, 1);
     v.column("offsets.total", total, S * S, 4);
+    auto& [pairs, product, lasting] = accuracy;
+    v.column("accuracy.pairs", pairs, S * S, 1);
+    v.column("accuracy.product", product, S * S, 1);
+    v.column("accuracy.lasting", lasting, S, 1);
     v.column("log_side_variance", log_side_variance, S, 1);
     v.numbers("learnt_s", &learnt_s, 1, Values::any);
 }

@@ -17,6 +17,7 @@
 #include "filters/object_probability.hpp"
 #include "filters/picture_motion.hpp"
 #include "filters/score_calibration.hpp"
+#include "filters/sensor_accuracy.hpp"
 #include "filters/sensor_offsets.hpp"
 #include "filters/visibility.hpp"
 
@@ -32,6 +33,8 @@ struct Tracks {
     std::vector<double> recent_hits, recent_misses;
     std::vector<Sides> last_box;               // compare_sensors
     std::vector<double> last_box_s;
+    std::vector<double> apart, apart_s;        // compare_sensors
+    std::vector<std::uint8_t> has_apart;
     std::vector<double> innovation;            // learn_noise
     std::vector<std::uint8_t> has_innovation;
     std::vector<double> real, log_odds, sees;  // judge
@@ -55,6 +58,9 @@ struct Tracks {
         visit("recent_misses", recent_misses, S);
         visit("last_box", last_box, S);
         visit("last_box_s", last_box_s, S);
+        visit("apart", apart, S * S * 4);
+        visit("apart_s", apart_s, S * S);
+        visit("has_apart", has_apart, S * S);
         visit("innovation", innovation, 4);
         visit("has_innovation", has_innovation, 1);
         visit("real", real, 1);
@@ -75,6 +81,9 @@ struct Tracks {
         widen_rows(last_box, rows, S, 1);
         widen_rows(last_box_s, rows, S, 1);
         widen_rows(sees, rows, S, 1);
+        widen_pairs(apart, rows, S, 4);
+        widen_pairs(apart_s, rows, S, 1);
+        widen_pairs(has_apart, rows, S, 1);
         evidence.widen();
     }
 };
@@ -90,6 +99,8 @@ struct Sensor {
     // What the user says of it: the logit of the score at which a box is as likely real as not, NaN where it is to
     // be learnt.
     double even_logit = std::numeric_limits<double>::quiet_NaN();
+    // And the variance of what lasts of its errors (sizes²), NaN where it is to be learnt.
+    double given_lasting = std::numeric_limits<double>::quiet_NaN();
 };
 
 struct State {
@@ -106,6 +117,7 @@ struct State {
     GapCounts gaps;                 // count_gaps, end_tracks
     SensorBelief belief;            // learn
     OffsetSums offsets;             // compare_sensors
+    AccuracySums accuracy;          // compare_sensors, learn
     std::vector<double> log_side_variance;  // learn_noise
     std::vector<Sensor> sensors;
     Evidence ended;                 // end_tracks
@@ -119,11 +131,21 @@ struct State {
         belief.noise_share = c.noise_share;
     }
 
-    // Mean of ln of the variances of sides of the sensors that have looked.
+    // Variances of the sensors' sides as the filter takes them.
+    double noise(std::size_t k) const {
+        return side_noise(log_side_variance[k], offsets.compared(k), accuracy.lasting[k], constants);
+    }
+    std::vector<double> noises() const {
+        std::vector<double> out(sensors.size());
+        for (std::size_t k = 0; k < out.size(); ++k) out[k] = noise(k);
+        return out;
+    }
+
+    // Mean of their ln over the sensors that have had a scan.
     double log_scene_variance() const {
         double sum = 0.0, number = 0.0;
         for (std::size_t k = 0; k < sensors.size(); ++k)
-            if (!std::isnan(sensors[k].last_scan_s)) sum += log_side_variance[k], number += 1.0;
+            if (!std::isnan(sensors[k].last_scan_s)) sum += log_of(noise(k)), number += 1.0;
         return sum / std::max(number, 1.0);
     }
 
@@ -134,7 +156,7 @@ struct State {
         return picture_known && at >= beyond;
     }
 
-    void declare_sensor(double even_logit) {
+    void declare_sensor(double even_logit, double score_weight, double given_lasting) {
         belief.widen(constants);
         tracks.widen();
         ended.widen();
@@ -143,6 +165,9 @@ struct State {
         Sensor sensor;
         sensor.leftovers = sensor.false_boxes = constants.first_leftovers;
         sensor.even_logit = even_logit;
+        sensor.given_lasting = given_lasting;
+        belief.score_weight.back() = score_weight;
+        accuracy.widen(std::isnan(given_lasting) ? 0.0 : given_lasting);
         sensors.push_back(std::move(sensor));
     }
 };

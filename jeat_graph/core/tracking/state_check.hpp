@@ -127,6 +127,9 @@ inline void check_tracks(const Tracks& tracks, const State& state) {
     for (const double time : tracks.last_box_s) check_past("tracks.last_box_s", time, state.t);
     for (const Sides& box : tracks.last_box)
         require(box.right >= box.left && box.bottom >= box.top, "tracks.last_box", "is inside out");
+    for (const double time : tracks.apart_s) check_past("tracks.apart_s", time, state.t);
+    check_flags("tracks.has_apart", tracks.has_apart);
+    check_between("tracks.apart", tracks.apart, -kMostLogSize, kMostLogSize);
     check_flags("tracks.has_innovation", tracks.has_innovation);
     check_between("tracks.innovation", tracks.innovation, -kMostLogVariance, kMostLogVariance);
     check_between("tracks.real", tracks.real, 0.0, 1.0);
@@ -142,6 +145,7 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
     require(!std::isinf(sensor.last_scan_s), name + "last_scan_s", "is no time");
     check_past(name + "last_scan_s", sensor.last_scan_s, now);
     require(!(std::abs(sensor.even_logit) > kMostLogVariance), name + "even_logit", "is of no score");
+    require(!(sensor.given_lasting < 0.0) && !(sensor.given_lasting > 1.0), name + "given_lasting", "is no variance");
     const RepeatCounts& counts = sensor.repetition;
     for (int bin = 0; bin < kScoreBins; ++bin) {
         const double boxes = counts.boxes[static_cast<std::size_t>(bin)], repeated = counts.repeated[static_cast<std::size_t>(bin)];
@@ -153,6 +157,19 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
     for (const Sides& box : counts.last_boxes)
         require(box.right >= box.left && box.bottom >= box.top, name + "last_boxes", "is inside out");
     check_flags(name + "last_had_before", counts.last_had_before);
+}
+
+inline void check_accuracy(const AccuracySums& sums) {
+    check_counts("accuracy.pairs", sums.pairs);
+    check_between("accuracy.lasting", sums.lasting, 0.0, kMostLogVariance);
+    const std::size_t S = sums.sensors();
+    for (std::size_t i = 0; i < S; ++i)
+        for (std::size_t j = 0; j < S; ++j) {
+            const std::size_t at = i * S + j, back = j * S + i;
+            require(sums.pairs[at] == sums.pairs[back] && sums.product[at] == sums.product[back], "accuracy",
+                    "is not the same both ways");
+            require(std::abs(sums.product[at]) <= kMostLogSize * (sums.pairs[at] + 1.0), "accuracy.product", "is of no boxes");
+        }
 }
 
 inline void check_belief(const State& state) {
@@ -175,6 +192,8 @@ inline void check_belief(const State& state) {
     check_counts("gaps.ended", state.gaps.ended);
     for (std::size_t k = 0; k < state.gaps.ended.size(); ++k)
         check_between("gaps.ended_well", state.gaps.ended_well[k], 0.0, state.gaps.ended[k]);
+    check_between("belief.score_weight", belief.score_weight, 0.0, kMostLogVariance);
+    check_accuracy(state.accuracy);
     const OffsetSums& offsets = state.offsets;
     check_counts("offsets.weight", offsets.weight);
     for (std::size_t i = 0; i < offsets.sensors; ++i)

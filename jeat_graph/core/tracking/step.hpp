@@ -140,7 +140,7 @@ private:
         std::vector<std::size_t> order(scans.size());
         std::iota(order.begin(), order.end(), std::size_t{0});
         std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-            const double va = s_.log_side_variance[scans[a].sensor], vb = s_.log_side_variance[scans[b].sensor];
+            const double va = s_.noise(scans[a].sensor), vb = s_.noise(scans[b].sensor);
             if (va != vb) return va < vb;
             if (scans[a].logits != scans[b].logits) return scans[a].logits < scans[b].logits;
             for (std::size_t k = 0; k < scans[a].boxes.size(); ++k) {
@@ -204,7 +204,7 @@ private:
     }
 
     void correct_boxes(const Scan& scan) {
-        const auto offset = s_.offsets.offset(scan.sensor, s_.log_side_variance, c_);
+        const auto offset = s_.offsets.offset(scan.sensor, s_.noises(), c_);
         boxes_.clear();
         edges_.clear();
         const Sensor& sensor = s_.sensors[scan.sensor];
@@ -226,7 +226,7 @@ private:
         changes_.clear();
         for (std::size_t i = 0; i < tracks.size(); ++i)
             changes_.push_back(camera_change(tracks.mean_of(i), tracks.evidence.last_s[i], *motion, camera, now, step_s_));
-        see_sure_tracks(exp_of(s_.log_side_variance[scan.sensor]));
+        see_sure_tracks(s_.noise(scan.sensor));
         moved_tracks_ = camera_tracks_;
         for (std::size_t k = 0; k < moved_tracks_.size(); ++k) {
             const CameraChange& change = changes_[sure_rows_[k]];
@@ -266,7 +266,7 @@ private:
 
     void follow_camera(const Scan& scan) {
         Tracks& tracks = s_.tracks;
-        const double rho2 = exp_of(s_.log_side_variance[scan.sensor]), dt = static_cast<double>(ticks_) / filters::kTicksPerS;
+        const double rho2 = s_.noise(scan.sensor), dt = static_cast<double>(ticks_) / filters::kTicksPerS;
         if (ticks_ <= 0) return;  // no time, no motion
         see_sure_tracks(rho2);
         const CameraMotion motion = estimate_camera(camera_tracks_, boxes_, *index_, s_.width, s_.height, dt, s_.camera, c_);
@@ -279,7 +279,7 @@ private:
     void associate(Scan& scan) {
         Tracks& tracks = s_.tracks;
         const std::size_t n = tracks.size(), k = scan.sensor;
-        const double rho2 = exp_of(s_.log_side_variance[k]);
+        const double rho2 = s_.noise(k);
         scan.noise_scale = rho2 / square(c_.side_std);
         expected_.resize(n);
         p_detect_.resize(n);
@@ -471,7 +471,7 @@ private:
         for (const std::size_t j : free_) free_boxes_.push_back(boxes_[j]);
         const ByLeft among(free_boxes_);
         append_rows(tracks, n, free_.size());
-        const double rho2 = exp_of(s_.log_side_variance[k]);
+        const double rho2 = s_.noise(k);
         for (std::size_t f = 0; f < free_.size(); ++f) {
             const std::size_t row = n + f, j = free_[f];
             may_be_interrupted();
@@ -514,15 +514,28 @@ private:
                 const double age = s_.t - tracks.last_box_s[i * S + other];
                 if (!(before.right > before.left) || age > c_.offset_age_s || !(tracks.real[i] > c_.report)) continue;
                 const double* const m = tracks.mean_of(i);
-                s_.offsets.count(k, other,
-                                 difference(scan.boxes[j], before, m[kVelocity] * age, m[kStates + kVelocity] * age),
-                                 expected, c_);
+                const auto d = difference(scan.boxes[j], before, m[kVelocity] * age, m[kStates + kVelocity] * age);
+                s_.offsets.count(k, other, d, expected, c_);
+                compare_errors(i, k, other, clipped(d, expected, c_));
             }
         }
         for (std::size_t j = 0; j < scan.boxes.size(); ++j) {
             tracks.last_box[taken_by_[j] * S + k] = scan.boxes[j];
             tracks.last_box_s[taken_by_[j] * S + k] = s_.t;
         }
+    }
+
+    // Count what lasts of the differences of two sensors; keep this one where the last is old.
+    void compare_errors(std::size_t row, std::size_t k, std::size_t other, const std::array<double, 4>& d) {
+        Tracks& tracks = s_.tracks;
+        const std::size_t S = s_.sensors.size(), at = (row * S + k) * S + other;
+        const double age = tracks.has_apart[at] ? s_.t - tracks.apart_s[at] : std::numeric_limits<double>::infinity();
+        if (age < c_.lasting_after_s) return;
+        double* const before = tracks.apart.data() + at * 4;
+        if (age <= c_.lasting_within_s) s_.accuracy.count(k, other, product_of(d, before));
+        std::copy(d.begin(), d.end(), before);
+        tracks.apart_s[at] = s_.t;
+        tracks.has_apart[at] = 1;
     }
 
     // Keep of each track that was found now the least overlap ever with a better one.
@@ -581,6 +594,9 @@ private:
     void learn(double t) {
         if (t - s_.learnt_s < c_.learn_period_s) return;
         s_.learnt_s = t;
+        std::vector<double> given(s_.sensors.size());
+        for (std::size_t k = 0; k < given.size(); ++k) given[k] = s_.sensors[k].given_lasting;
+        s_.accuracy.solve(s_.log_side_variance, s_.belief.p_detect, given, c_);
         learn_sensors(s_.ended, s_.tracks.evidence, s_.belief, c_);
     }
 
