@@ -57,7 +57,7 @@ class SensorBelief(NamedTuple):
         agreed_mean, agreed_std: (S,) mean and standard deviation of its scores (logits) of tracks that
             another sensor finds as well.
         agreed_share: (S,) how far these are believed, 0 before any.
-        score_weight: (S,) what its scores are worth, as the user says; 1 where he says nothing.
+        score_weight: (S,) weight of its scores as evidence, as the user says; 1 where he says nothing.
         noise_share: prior share ν of noise among what is not real.
     """
 

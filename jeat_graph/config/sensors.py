@@ -41,7 +41,7 @@ class SensorConfig(Section):
         open_low=True,
     )
     score_weight: float = number(
-        1.0, "1", "what its scores are worth as evidence for or against an object; 0: nothing", 0.0, 10.0
+        1.0, "1", "weight of its scores as evidence for or against an object; 0: none", 0.0, 10.0
     )
     lasting_error: float | None = number(
         None,

@@ -135,6 +135,7 @@ class OneModel(SmoothsRecords):
                 unseen=float(belief.unseen[k]),
                 stationary_unseen=float(belief.stationary_unseen[k]),
                 noise_scale=float(noise[k]),
+                lasting_error=float(learnt.lasting_error[k]),
                 offset_centre_share=(offsets[k][0], offsets[k][1]),
                 offset_log_size=(offsets[k][2], offsets[k][3]),
             )

@@ -15,6 +15,7 @@ class SensorState(NamedTuple):
         precision: probability that what it detects again and again is real.
         unseen: share of real objects that it never detects.
         stationary_unseen: share of the others that it does not detect while they stand.
+        lasting_error: standard deviation of what its boxes are off as long as they show one object (sizes).
         offset_centre_share: offset of its boxes' centres from those of the other sensors, as a share of the
             side; it is subtracted from its boxes, and so is
         offset_log_size: that of ln width and ln height.
@@ -26,5 +27,6 @@ class SensorState(NamedTuple):
     precision: float = float("nan")
     unseen: float = float("nan")
     stationary_unseen: float = float("nan")
+    lasting_error: float = float("nan")
     offset_centre_share: tuple[float, float] = (0.0, 0.0)
     offset_log_size: tuple[float, float] = (0.0, 0.0)

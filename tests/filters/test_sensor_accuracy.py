@@ -1,4 +1,4 @@
-"""What lasts of detectors' errors, by differences: drawn detectors of known accuracy, and two engines' worth of edges."""
+"""What lasts of detectors' errors: drawn detectors of known accuracy, and a solver of least squares beside."""
 
 from __future__ import annotations
 

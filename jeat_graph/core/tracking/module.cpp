@@ -433,7 +433,7 @@ void bind(nb::module_& module) {
              nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(), nb::arg("score_weight") = 1.0,
              nb::arg("lasting") = std::numeric_limits<double>::quiet_NaN(),
              "Add a sensor that has had no scan yet. even_logit: of the score at which a box is as likely real as not,\n"
-             "NaN where it is to be learnt; score_weight: what its scores are worth; lasting: variance of what lasts of\n"
+             "NaN where it is to be learnt; score_weight: of its scores as evidence; lasting: variance of what lasts of\n"
              "its errors (sizes²), NaN where it is to be learnt.")
         .def("take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
              nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("similarity").noconvert() = nb::none(),
