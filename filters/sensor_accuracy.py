@@ -13,7 +13,7 @@ Control 15, 1970). Centres count twice and ln sizes half: V is the variance of o
   variances is the three-cornered hat (Gray and Allan, Proc. 28th Frequency Control Symposium, 1974).
 - Two alone cannot say which of them is off. What their differences have beyond κ (ρ_s² + ρ_o²), which the
   states of lasting errors hold already (`singer`), is shared in proportion to 1 − P_D: the one that finds less
-  is taken for the worse witness.
+  is taken for the less accurate one.
 
 An error that lasts is not averaged out by the boxes in the filter's memory, whose number n is `lasting_boxes`.
 So the variance of a side of sensor s is
