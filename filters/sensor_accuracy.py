@@ -1,4 +1,4 @@
-"""How far the boxes of a detector are off: what lasts of its errors, learnt from what others say of the objects.
+"""How far the boxes of a detector are off: what lasts of its errors, learnt from what others say of them.
 
 Innovations tell how well boxes repeat (`noise_learning`). An error that an object keeps for as long as it is
 seen shows in none of them, but in what two sensors s and o differ by: with d of `sensor_offsets`, less its
@@ -12,11 +12,11 @@ Control 15, 1970). Centres count twice and ln sizes half: V is the variance of o
 - Of three sensors or more that are compared with each other, the least squares solution without negative
   variances is the three-cornered hat (Gray and Allan, Proc. 28th Frequency Control Symposium, 1974).
 - Two alone cannot say which of them is off. What their differences have beyond κ (ρ_s² + ρ_o²), which the
-  states of lasting errors hold already (`singer`), is shared in proportion to 1 − P_D: the one that finds less
-  is taken for the less accurate one.
+  states of lasting errors hold already (`singer`), is shared in proportion to 1 − P_D: the one that finds
+  less is taken for the less accurate one.
 
-An error that lasts is not averaged out by the boxes in the filter's memory, whose number n is `lasting_boxes`.
-So the variance of a side of sensor s is
+An error that lasts is not averaged out by the boxes in the filter's memory, whose number n is
+`lasting_boxes`. So the variance of a side of sensor s is
 
     r_s = max(ρ_s², ρ_c²) + n V_s,
 

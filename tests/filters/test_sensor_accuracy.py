@@ -1,4 +1,4 @@
-"""What lasts of detectors' errors: drawn detectors of known accuracy, and a solver of least squares beside."""
+"""What lasts of detectors' errors: drawn detectors of known accuracy, and another solver beside."""
 
 from __future__ import annotations
 
