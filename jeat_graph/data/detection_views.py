@@ -32,20 +32,25 @@ class DetectionViews:
 
         def to_rows(self) -> tuple[FloatArray, TextArray, FloatArray, FloatArray, BoolArray, TextArray]:
             """One row a detection or empty scan."""
+            ...
 
         def embedding_rows(self) -> EmbeddingArray | None:
             """What each row of `to_rows` looks like."""
+            ...
 
         def motion_rows(self) -> FloatArray | None:
             """The camera's motion in the first of each scan's rows."""
+            ...
 
         @staticmethod
         def from_rows(*columns: Any) -> Detections:
             """Group rows into scans."""
+            ...
 
         @staticmethod
         def from_table(rows: DetectionRows) -> Detections:
             """Group the rows of a table into scans."""
+            ...
 
     def to_pandas(self) -> pd.DataFrame:
         """Return a data frame with the columns of `detections.csv`: one row a detection or empty scan."""

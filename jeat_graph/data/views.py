@@ -46,9 +46,11 @@ class TrajectoryViews:
 
         def take(self, rows: npt.ArrayLike) -> Self:
             """Return some rows."""
+            ...
 
         def sensor_text(self) -> list[str]:
             """Names of the sensors used in each row."""
+            ...
 
         def __len__(self) -> int: ...
 

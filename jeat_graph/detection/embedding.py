@@ -28,9 +28,11 @@ class Embedder(Protocol):
 
     def __call__(self, frame: RgbImage, boxes: FloatArray) -> EmbeddingArray:
         """Return vectors (M, E) of boxes (M, 4) in a picture (H, W, 3), NaN where a box shows nothing."""
+        ...
 
     def note(self) -> str:
         """Say what was wrong so far; empty if nothing was."""
+        ...
 
 
 def open_embedder(name: str, settings: EmbedderSettings) -> Embedder:

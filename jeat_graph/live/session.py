@@ -58,6 +58,7 @@ class RowsEnd(Protocol):
 
     def flush(self) -> int:
         """Start over elsewhere if that is due; how much there is by now, which a checkpoint keeps."""
+        ...
 
 
 @dataclass

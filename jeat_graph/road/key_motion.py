@@ -36,23 +36,29 @@ class RoadMotion(Protocol):
     @property
     def coefficients(self) -> FloatArray:
         """Coefficients (2, C)."""
+        ...
 
     @property
     def covariance(self) -> FloatArray:
         """Their covariance (2 C, 2 C) by noise, those across first."""
+        ...
 
     @property
     def t(self) -> FloatArray:
         """Times (N,) of what was fitted, ascending (s)."""
+        ...
 
     def window(self) -> tuple[float, float]:
         """First and last time that the fit believes (s)."""
+        ...
 
     def basis(self, t: FloatArray, derivative: int = 0) -> FloatArray:
         """Rows (..., C) whose product with the coefficients is place, speed or acceleration at t (s)."""
+        ...
 
     def at(self, t: FloatArray, derivative: int = 0) -> FloatArray:
         """Place (m), speed (m/s) or acceleration (m/s²), (..., 2), at times t (...)."""
+        ...
 
 
 class KeyMotion(NamedTuple):

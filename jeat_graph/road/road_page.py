@@ -42,7 +42,7 @@ def render_road_page(result: RoadResult, camera: RoadCamera, config: SummaryConf
         name: what it is about.
     """
     parts = [
-        page_head(f"{name}: the road of jeat-graph", beside(__package__, "road_page.css")),
+        page_head(f"{name}: the road of jeat-graph", beside("jeat_graph.road", "road_page.css")),
         _header(result, name),
         "<main>",
         _lanes(result, config),

@@ -76,9 +76,11 @@ class Moment(Protocol):
 
     def identities(self) -> IntArray:
         """Return the identities (N,) of the living tracks."""
+        ...
 
     def born(self) -> int:
         """Return the number of tracks started before it."""
+        ...
 
 
 class Recorded(Protocol):
@@ -86,6 +88,7 @@ class Recorded(Protocol):
 
     def track_ids(self) -> IntArray:
         """Return the identities (N,) of the tracks after the step, before any ended."""
+        ...
 
 
 class TrackEngine(Protocol):
@@ -94,26 +97,32 @@ class TrackEngine(Protocol):
     @property
     def name(self) -> str:
         """Name, as `tracker.engine` has it."""
+        ...
 
     @property
     def can_save(self) -> bool:
         """Whether `state` has something to say."""
+        ...
 
     @property
     def has_fit(self) -> bool:
         """Whether `fit` and `measurements` have."""
+        ...
 
     @property
     def weighs(self) -> bool:
         """Whether `hypotheses` has."""
+        ...
 
     @property
     def compares_appearance(self) -> bool:
         """Whether it takes what boxes look like."""
+        ...
 
     @property
     def takes_owners(self) -> bool:
         """Whether it can be given who is who."""
+        ...
 
     def declare_sensor(self, name: str, declared: SensorConfig) -> None:
         """Add a sensor that has had no scan yet, with what the user says of it."""
@@ -133,6 +142,7 @@ class TrackEngine(Protocol):
 
     def snapshot(self) -> Moment:
         """Return a copy of all that the next step depends on."""
+        ...
 
     def restore(self, moment: Moment) -> None:
         """Go back to a snapshot of this engine.
@@ -143,42 +153,55 @@ class TrackEngine(Protocol):
 
     def time(self) -> float | None:
         """Return the time of the last step (s); None before the first."""
+        ...
 
     def size(self) -> int:
         """Return the number of living tracks."""
+        ...
 
     def born(self) -> int:
         """Return the number of tracks started so far."""
+        ...
 
     def identities(self) -> IntArray:
         """Return the identities (N,) of the living tracks, ascending."""
+        ...
 
     def living(self) -> IntArray:
         """Return the identities (N,) of the tracks of the last step, before any ended."""
+        ...
 
     def assigned(self) -> IntArray:
         """Return the identity of the track (M,) that took each box of the last step, 0 where none did."""
+        ...
 
     def rows(self) -> ModelRows:
         """Return the tracks that the last step reports."""
+        ...
 
     def reported(self) -> Callable[[], ModelRows]:
         """Return a function that gives these rows, after later steps too."""
+        ...
 
     def predicted(self, t: float) -> tuple[ModelRows, FloatArray]:
         """Return these tracks at a later time (s), and the covariances (N, 2, 5, 5) of what is told."""
+        ...
 
     def last_scans(self) -> FloatArray:
         """Return the time of each sensor's (S,) last scan (s), NaN before it."""
+        ...
 
     def picture(self) -> tuple[float, float] | None:
         """Return width and height of the picture (px), as far as is known; None where it does not matter."""
+        ...
 
     def boxes_end_at_edge(self) -> bool:
         """Return whether boxes are to end at the edge of the picture where `output.clip` says so."""
+        ...
 
     def sensor_states(self) -> Sequence[SensorState]:
         """Return what has been learnt of each sensor."""
+        ...
 
     def fit(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return how well the boxes of the last step fitted.
@@ -190,6 +213,7 @@ class TrackEngine(Protocol):
         Raises:
             JeatGraphError: the engine does not say it.
         """
+        ...
 
     def measurements(self, measured: StepBoxes) -> RecordArray:
         """Return the boxes of the last step as `MEASUREMENT` (M,), as the filter weighed them.
@@ -197,6 +221,7 @@ class TrackEngine(Protocol):
         Raises:
             JeatGraphError: the engine does not say it.
         """
+        ...
 
     def hypotheses(self, t: float, shown: IntArray, sensors: tuple[str, ...]) -> Hypotheses:
         """Return what the living tracks are taken for, and why.
@@ -209,12 +234,15 @@ class TrackEngine(Protocol):
         Raises:
             JeatGraphError: the engine weighs no hypotheses.
         """
+        ...
 
     def record(self) -> Recorded:
         """Return what the last step gave the smoother; once."""
+        ...
 
     def step_record(self, record: Recorded) -> StepRecord:
         """Return the states of a step that `record` returned, as every engine has them."""
+        ...
 
     def hand_over(
         self,
@@ -234,15 +262,19 @@ class TrackEngine(Protocol):
 
     def smoothed(self) -> ModelRows:
         """Return the smoothed rows so far, without what was drained."""
+        ...
 
     def drain(self) -> ModelRows:
         """Return the smoothed rows that have become final, and forget them."""
+        ...
 
     def finish(self) -> ModelRows:
         """End all tracks and return the smoothed rows that are not drained."""
+        ...
 
     def smoother_counts(self) -> dict[str, int]:
         """Return what the smoother counts, by name."""
+        ...
 
     def settle(self) -> None:
         """Forget what the smoother can make again: what follows is as of one that was saved and loaded."""
@@ -253,6 +285,7 @@ class TrackEngine(Protocol):
         Raises:
             JeatGraphError: the engine is not saved.
         """
+        ...
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go on from what `state` returned.

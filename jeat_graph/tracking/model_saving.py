@@ -73,6 +73,7 @@ class SavedModel:
 
         def snapshot(self) -> ModelSnapshot:
             """Copy all that the next step depends on."""
+            ...
 
         def restore(self, snapshot: ModelSnapshot) -> None:
             """Go back to a snapshot."""

@@ -15,6 +15,7 @@ class OldNames:
 
         def assigned(self, count: int) -> IntArray:
             """Which track took each detection of the last step."""
+            ...
 
         def reset(self, t: float) -> None:
             """End all tracks and let time go on from another moment."""

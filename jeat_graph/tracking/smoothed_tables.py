@@ -46,6 +46,7 @@ class SmoothedTables:
 
         def _smoothed_table(self, rows: ModelRows) -> Trajectories:
             """Return rows of the smoother as a table."""
+            ...
 
     @property
     def keeps_recording(self) -> bool:

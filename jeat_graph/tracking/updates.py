@@ -27,9 +27,11 @@ class Updates:
 
         def step(self, scans: ScanLike | Sequence[ScanLike]) -> Trajectories:
             """Take in scans of one time."""
+            ...
 
         def assigned(self, count: int) -> IntArray:
             """Which track took each detection of the last step."""
+            ...
 
     def update(
         self,

@@ -26,6 +26,7 @@ class Engine(Protocol):
 
     def run(self, inputs: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
         """Return all outputs by their names."""
+        ...
 
 
 def open_engine(path: str | Path, head: OnnxHead, backend: str, threads: int) -> Engine:

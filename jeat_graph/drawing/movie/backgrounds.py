@@ -31,6 +31,7 @@ class FilmBackground(Protocol):
 
     def image(self, t: float) -> RgbImage:
         """Return the picture (H, W, 3) at time `t` (s); not to be changed."""
+        ...
 
 
 class PlainBackground:

@@ -48,7 +48,7 @@ def render_page(data: RunData, compared: ComparedRun | None = None, not_compared
         _list(data),
         _details(data),
         "</main>",
-        f"<script>\n{beside(__package__, 'page.js')}</script>" if len(data.track_ids()) else "",
+        f"<script>\n{beside('jeat_graph.drawing.page', 'page.js')}</script>" if len(data.track_ids()) else "",
         "</body></html>",
     ]
     return "\n".join(part for part in parts if part) + "\n"

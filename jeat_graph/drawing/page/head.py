@@ -23,7 +23,7 @@ def page_head(title: str, more_style: str = "", *, scripts: bool = False) -> str
         more_style: CSS that follows the style of all pages.
         scripts: whether scripts within the page may run.
     """
-    style = beside(__package__, "page.css") + more_style
+    style = beside("jeat_graph.drawing.page", "page.css") + more_style
     parts = [
         "<!doctype html>",
         '<html lang="en"><head><meta charset="utf-8">',

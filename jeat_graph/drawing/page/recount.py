@@ -112,6 +112,6 @@ def render_recount(
             '</tr></thead><tbody></tbody></table><p class="quiet">Intervals are Wilson\'s, of vehicles '
             "taken to be independent.</p></section>",
             f'<script type="application/json" id="data">{text}</script>',
-            f"<script>\n{beside(__package__, 'recount.js')}</script></body></html>\n",
+            f"<script>\n{beside('jeat_graph.drawing.page', 'recount.js')}</script></body></html>\n",
         ]
     )

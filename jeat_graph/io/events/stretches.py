@@ -31,16 +31,20 @@ class Stretches(Protocol):
     @property
     def size_px(self) -> tuple[int, int] | None:
         """Width and height."""
+        ...
 
     @property
     def duration_us(self) -> int:
         """Time of the last event + 1 (µs)."""
+        ...
 
     def between(self, start_us: int, end_us: int) -> EventArray:
         """Return the events with `start_us` <= t < `end_us`."""
+        ...
 
     def notes(self) -> list[str]:
         """Return what is known to be wrong with the file, one line for each."""
+        ...
 
 
 class IndexedStretches(EventFile):

@@ -22,6 +22,7 @@ class HasHealth(Protocol):
 
     def health(self) -> dict[str, Any]:
         """Return what `/health` says, with `ready`."""
+        ...
 
 
 def metrics_of(status: Status | HasHealth) -> MetricsText:

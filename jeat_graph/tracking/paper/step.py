@@ -110,7 +110,7 @@ def _with_births(record: FilterRecord, new: PaperTracks, sensor: IntArray) -> Fi
     mean, covariance = together(new)
     still = np.broadcast_to(np.eye(mean.shape[2]), (len(new), 1, mean.shape[2], mean.shape[2]))
     more = (new.track_id, still, mean, covariance, mean, covariance, sensor)
-    return FilterRecord(*(np.concatenate(pair) for pair in zip(record, more, strict=True)))
+    return FilterRecord._make(np.concatenate(pair) for pair in zip(record, more, strict=True))
 
 
 def confirm(tracks: PaperTracks, t: float, config: PaperConfig) -> PaperTracks:

@@ -32,6 +32,7 @@ class Source(Protocol):
         Raises:
             JeatGraphError: no more will come: another program reads in this one's place, or the like.
         """
+        ...
 
     def commit(self) -> None:
         """Tell the broker that all that was received need not come again."""
@@ -55,6 +56,7 @@ class Sink(Protocol):
     @property
     def too_large(self) -> int:
         """Messages that were not sent because of their size."""
+        ...
 
     def send(self, message: bytes) -> None:
         """Hand over a message; waits while too many are on their way.

@@ -7,11 +7,13 @@ from functools import cache
 from jeat_graph.data.records import records_in
 from jeat_graph.live.transport.brokers.record import Broker
 
+_PACKAGE = "jeat_graph.live.transport.brokers"
+
 
 @cache
 def brokers() -> dict[str, Broker]:
     """Return the records of all brokers, by the scheme of their addresses."""
-    found: list[Broker] = records_in(__package__, "BROKER")
+    found: list[Broker] = records_in(_PACKAGE, "BROKER")
     return {one.scheme: one for one in sorted(found, key=lambda one: one.scheme)}
 
 
