@@ -5,11 +5,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "constants.hpp"
 #include "filters/model_constants.hpp"
 #include "math.hpp"
-#include "wide.hpp"
 
 namespace jeat::filters {
 
@@ -161,35 +161,56 @@ inline constexpr int kDriven[kStates][2] = {{kPosition, kAcceleration}, {kVeloci
 
 // Rows of matrices are this long where loops over them are to become vectors.
 inline constexpr int kRow = kStates + 1;
-using Rows = double[kStates][kRow];
 
-// P <- F P F' + Q of one axis. Where F' is 0 it adds 0 to sums that began with 0, which changes none of them.
-inline void predict_covariance(double* P, const Matrix& F, const Rows& Ft, const Matrix& Q) {
-    Rows from = {};
-    for (int i = 0; i < kStates; ++i) std::copy(P + i * kStates, P + (i + 1) * kStates, from[i]);
-    for (int i = 0; i < kStates; ++i) {
-        double FP[kRow] = {}, sum[kRow] = {};
-        for (int k = kDriven[i][0]; k <= kDriven[i][1]; ++k)
-            for (int j = 0; j < kRow; ++j) FP[j] += F[i * kStates + k] * from[k][j];
-        for (int k = i; k < kStates; ++k)
-            for (int j = 0; j < kRow; ++j) sum[j] += FP[k] * Ft[k][j];
-        for (int j = i; j < kStates; ++j) P[i * kStates + j] = P[j * kStates + i] = sum[j] + Q[i * kStates + j];
-    }
+// A number of each axis: what is computed of both is computed side by side.
+struct Both {
+    double x, y;
+};
+inline Both operator+(Both a, Both b) { return {a.x + b.x, a.y + b.y}; }
+inline Both operator*(double f, Both a) { return {f * a.x, f * a.y}; }
+
+// Call body(i) for i from `First` to `Last`, which are known when it is compiled: no loop is left.
+template <int First, int Last, class Body> inline void each(Body body) {
+    [&]<int... I>(std::integer_sequence<int, I...>) {
+        (body(std::integral_constant<int, First + I>{}), ...);
+    }(std::make_integer_sequence<int, Last - First + 1>{});
+}
+
+// P <- F P F' + Q of both axes, of whose upper triangles alone.
+inline void predict_covariances(double* P, const Matrix& F, const Matrix& Q) {
+    constexpr int kLast = kStates - 1;
+    Both FP[kStates][kStates];
+    each<0, kLast>([&](auto i) {
+        each<i, kLast>([&](auto j) {
+            Both sum{0.0, 0.0};
+            each<kDriven[i][0], kDriven[i][1]>([&](auto k) {
+                sum = sum + F[i * kStates + k] * Both{P[k * kStates + j], P[kMatrix + k * kStates + j]};
+            });
+            FP[i][j] = sum;
+        });
+    });
+    each<0, kLast>([&](auto i) {
+        each<i, kLast>([&](auto j) {
+            Both sum{0.0, 0.0};
+            each<kDriven[j][0], kDriven[j][1]>([&](auto k) { sum = sum + F[j * kStates + k] * FP[i][k]; });
+            const double q = Q[i * kStates + j];
+            const Both out = sum + Both{q, q};
+            P[i * kStates + j] = P[j * kStates + i] = out.x;
+            P[kMatrix + i * kStates + j] = P[kMatrix + j * kStates + i] = out.y;
+        });
+    });
 }
 
 // m <- F m, P <- F P F' + Q.
-JEAT_GRAPH_WIDE void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
-                             const ModelConstants& c) {
+inline void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
+                    const ModelConstants& c) {
     const Matrix F = in_perspective(step.F, mean_growth(mean), dt, c);
     const double size = object_size(mean);
     std::array<double, kMean> predicted{};
-    Rows Ft = {};
-    for (int i = 0; i < kStates; ++i)
-        for (int j = kDriven[i][0]; j <= kDriven[i][1]; ++j) {
-            Ft[j][i] = F[i * kStates + j];
-            for (int axis = 0; axis < 2; ++axis)
+    for (int axis = 0; axis < 2; ++axis)
+        for (int i = 0; i < kStates; ++i)
+            for (int j = kDriven[i][0]; j <= kDriven[i][1]; ++j)
                 predicted[axis * kStates + i] += F[i * kStates + j] * mean[axis * kStates + j];
-        }
     const double growth = 0.5 * (std::abs(predicted[kGrowth]) + std::abs(predicted[kStates + kGrowth]));
     const double g = std::min(growth, c.fastest_growth);
     const double jerk = q.root_jerk + c.perspective_jerk * g * g * std::sqrt(g);
@@ -197,9 +218,9 @@ JEAT_GRAPH_WIDE void predict(double* mean, double* covariance, const Discretised
     Matrix Q;
     for (int k = 0; k < kMatrix; ++k)
         Q[k] = by_jerk * step.jerk[k] + q.growth * step.growth[k] + q.size * step.size[k] + by_walk * step.position[k];
+    predict_covariances(covariance, F, Q);
     for (int axis = 0; axis < 2; ++axis) {
         double* const P = covariance + axis * kMatrix;
-        predict_covariance(P, F, Ft, Q);
         const LastingError error(exp_of(mean[axis * kStates + kLogSize]), size, q.rho2, c);
         const double forgotten = 1.0 - square(F[kPositionError * kStates + kPositionError]);
         P[kPositionError * kStates + kPositionError] += forgotten * error.position;
