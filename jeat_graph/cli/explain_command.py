@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from jeat_graph.cli.identity_texts import identity_texts
 from jeat_graph.cli.progress import stages
-from jeat_graph.cli.said_of_identities import said_of_identities
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.eval.tables import FORMATS
 
@@ -78,11 +78,11 @@ def run(args: argparse.Namespace) -> int:
         stage("tracking again")
         if args.track is None:
             place = explain_place(config, detections, *args.at)
-            print("\n".join(_said_of_place(place, args.at, args.format)))
+            print("\n".join(_text_of_place(place, args.at, args.format)))
             return 0
         wanted = [args.track]
         if identities is not None:
-            lines = said_of_identities(identities, args.track)
+            lines = identity_texts(identities, args.track)
             wanted += [one.causal_id for one in identities.of_identity(args.track)]
         found = explain_tracks(config, detections, set(wanted))
     # An identity that no causal track began with is told of by the causal tracks that it is made of.
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         raise DataError(f"there is no track {args.track}")
     for track_id in shown:
         lines += [""] * bool(lines)
-        lines += _said_of_track(found[track_id], track_id, args.format)
+        lines += _text_of_track(found[track_id], track_id, args.format)
     print("\n".join(lines))
     if args.out is not None:
         from jeat_graph.drawing.explanation import plot_explanation
@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _said_of_track(moments: Sequence[TrackMoment], track_id: int, form: str) -> list[str]:
+def _text_of_track(moments: Sequence[TrackMoment], track_id: int, form: str) -> list[str]:
     first, last = moments[0], moments[-1]
     shown = [one for one in moments if one.reported]
     lines = [f"track {track_id}: from {first.t:.3f} to {last.t:.3f} s, {_share_reported(moments, shown)}"]
@@ -143,7 +143,7 @@ def _table(moments: Sequence[TrackMoment]) -> Table:
     return Table.from_records(rows, title="Terms of the log odds", digits={"t": 3, "log odds": 1})
 
 
-def _said_of_place(place: PlaceStory, at: tuple[float, float, float], form: str) -> list[str]:
+def _text_of_place(place: PlaceStory, at: tuple[float, float, float], form: str) -> list[str]:
     from jeat_graph.eval.tables import Table
 
     t, x, y = at

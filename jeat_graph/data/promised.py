@@ -41,9 +41,9 @@ def _made(table: Trajectories) -> Trajectories:
     return table
 
 
-def _look(name: str) -> property:
+def _passed_on(name: str) -> property:
     return property(lambda table: vars(_made(table))[name])
 
 
 for _field in fields(Trajectories):
-    setattr(_Promised, _field.name, _look(_field.name))
+    setattr(_Promised, _field.name, _passed_on(_field.name))

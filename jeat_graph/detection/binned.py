@@ -31,7 +31,7 @@ class Signal(NamedTuple):
 
 
 class BinnedDetector:
-    """Turns events into scans, one each step; what a scan holds, `_look` says.
+    """Turns events into scans, one each step; what a scan holds, `_next_scan` says.
 
     Args:
         size_px: width and height of the picture.
@@ -71,13 +71,13 @@ class BinnedDetector:
         Raises:
             DataError: they begin before the last ones.
         """
-        return self.look(self.without_noise(events))
+        return self.scans_of(self.without_noise(events))
 
     def without_noise(self, events: EventArray) -> Signal | None:
-        """Do the first half of `push`, which another thread may do ahead of `look`; arguments as `push`.
+        """Do the first half of `push`, which another thread may do ahead of `scans_of`; arguments as `push`.
 
         Returns:
-            What `look` takes; None of no events.
+            What `scans_of` takes; None of no events.
 
         Raises:
             DataError: they begin before the last ones.
@@ -93,7 +93,7 @@ class BinnedDetector:
             signal = self._noise.keep(signal)
         return Signal(signal, first_us, last_us)
 
-    def look(self, signal: Signal | None) -> list[Scan]:
+    def scans_of(self, signal: Signal | None) -> list[Scan]:
         """Return the scans that are complete with the next events."""
         if signal is None:
             return []
@@ -124,7 +124,7 @@ class BinnedDetector:
         rest, self._rest = self._rest, EventArray.empty()
         return self._advance(rest)
 
-    def _look(self) -> Scan:
+    def _next_scan(self) -> Scan:
         """Return the scan of the window as it is."""
         raise NotImplementedError
 
@@ -146,7 +146,7 @@ class BinnedDetector:
         if self._until_scan:
             return []
         self._until_scan = self._step_bins
-        return [self._look()]
+        return [self._next_scan()]
 
 
 def _rows(events: EventArray, rows: slice) -> EventArray:

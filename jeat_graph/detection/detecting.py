@@ -263,7 +263,7 @@ def _fused_scans(
         detector = FusedDetector(network, source.size_px, FUSED_SENSOR, *settings)
         say(detector.description)
         flow = CameraFlow(request.settings.camera)
-        found = (flow(frame, detector.look_at(frame, t)) for t, frame in with_progress(source, len(source)))
+        found = (flow(frame, detector.scan_of(frame, t)) for t, frame in with_progress(source, len(source)))
         return _with_note(found, detector.note, say)
     reader, size_px = recording
     pictures = () if source is None else with_progress(source, len(source))
@@ -340,7 +340,7 @@ def _pushed(
     # Reading and unpacking take as long as looking where events are many.
     with closing(Ahead(signals(), _PIECES_AHEAD)) as coming:
         for signal in coming:
-            scans = detector.look(signal)
+            scans = detector.scans_of(signal)
             count += len(scans)
             yield from scans
     scans = detector.finish()

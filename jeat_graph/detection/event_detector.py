@@ -65,7 +65,7 @@ class EventDetector(BinnedDetector):
             self._lamps.watch(events)
         return super()._advance(events)
 
-    def _look(self) -> Scan:
+    def _next_scan(self) -> Scan:
         settings = self.settings
         found = self._clouds()
         t = self._bins.end_us / _US_PER_S - settings.extent_s / 2.0

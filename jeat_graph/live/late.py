@@ -169,7 +169,7 @@ class LiveTracker(OneAtATime):
             refuted=[*judged.refuted, *arrival.refuted],
             waiting=waiting,
             missed=missed,
-            clocks=self._said_of_steps(judged, news),
+            clocks=self._text_of_steps(judged, news),
         )
 
     def _judge(self, scans: list[Scan]) -> Judged:
@@ -181,7 +181,7 @@ class LiveTracker(OneAtATime):
             self.lateness.add(scan.sensor, 0.0, True)
         return judged
 
-    def _said_of_steps(self, judged: Judged, news: ClockNews | None) -> ClockNews | None:
+    def _text_of_steps(self, judged: Judged, news: ClockNews | None) -> ClockNews | None:
         """Take steps of clocks off from now on, and add what is to be said of them to the other news."""
         if judged.together:
             line = f"warning: the clock of all sensors was set back by {judged.together:.3f} s"

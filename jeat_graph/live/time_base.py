@@ -131,7 +131,7 @@ class TimeBase:
             return Decision([] if far else list(scans), [])
         known = {name for w in self.row for name in w.sensors} | set(sensors)
         alone = t > now and all(
-            look < now - self.bound_s for name, look in last_scan.items() if name not in known
+            seen < now - self.bound_s for name, seen in last_scan.items() if name not in known
         )
         refuted = self.clear() if self.row and abs(t - self.row[-1].t) > self._apart_s(now, alone) else []
         self.row.append(Witness(t, sensors, list(scans) if far else []))

@@ -107,7 +107,7 @@ class InputWatch:
         self._opinion_at = FIRST_BOXES
         self._times: dict[str, list[float]] = {}
         self._newest: dict[str, float] = {}
-        self._said: set[str] = set()
+        self._noted: set[str] = set()
         self._ended = False
         self._corners_checked = False
 
@@ -181,7 +181,7 @@ class InputWatch:
                 )
 
     def _say(self, kind: str, text: str) -> None:
-        if kind not in self._said:
-            self._said.add(kind)
+        if kind not in self._noted:
+            self._noted.add(kind)
             # Up from here: a judgement, `check`, the tracker's `take_in`, `step`, its lock, and its caller.
             warnings.warn(text, InputWarning, stacklevel=7)

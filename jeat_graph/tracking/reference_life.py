@@ -146,8 +146,8 @@ def report(state: ReferenceState, c: ModelConstants) -> BoolArray:
 
 def own_p_detect(tracks: ReferenceTracks, p_detect: FloatArray, c: ModelConstants) -> FloatArray:
     """Return each track's own P_D (N, S) by each sensor, whose means are `p_detect` (S,)."""
-    hits, looks = tracks.recent_hits, tracks.recent_hits + tracks.recent_misses
-    own = (p_detect * c.p_detect_strength + hits) / (c.p_detect_strength + looks)
+    hits, scans = tracks.recent_hits, tracks.recent_hits + tracks.recent_misses
+    own = (p_detect * c.p_detect_strength + hits) / (c.p_detect_strength + scans)
     return np.asarray(np.clip(own, *c.track_p_detect_bounds))
 
 

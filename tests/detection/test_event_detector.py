@@ -61,7 +61,7 @@ def test_noise_may_be_left_out_ahead():
     ahead, found = EventDetector(SIZE), []
     signals = [ahead.without_noise(events.take(rows)) for rows in np.array_split(np.arange(len(events)), 20)]
     for signal in [*signals, ahead.without_noise(events.take(slice(0)))]:
-        found += ahead.look(signal)
+        found += ahead.scans_of(signal)
     for one, other in zip(found + ahead.finish(), scans_of(events), strict=True):
         assert one.t == other.t
         np.testing.assert_array_equal(one.boxes, other.boxes)

@@ -87,7 +87,7 @@ class ModelEventDetector(BinnedDetector):
         super().__init__(size_px, sensor, rate_hz, ring, bins, times)
         self._by_polarity = _by_polarity(self._settings.channels, head)
         self._memory, outputs = _memory(head, self._path, self._beside)
-        self._told = next((port for port in head.inputs if port.name == ELAPSED), None)
+        self._elapsed_input = next((port for port in head.inputs if port.name == ELAPSED), None)
         self._before_s: float | None = None
         self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
         self._state: dict[str, npt.NDArray[Any]] = {}
@@ -114,7 +114,7 @@ class ModelEventDetector(BinnedDetector):
     def _emptied(self) -> None:
         self._state, self._before_s = {}, None
 
-    def _look(self) -> Scan:
+    def _next_scan(self) -> Scan:
         return self._scan(self._bins.end_us / _US_PER_S, self._window(), {})
 
     def _window(self) -> npt.NDArray[Any]:
@@ -157,11 +157,11 @@ class ModelEventDetector(BinnedDetector):
 
     def _elapsed(self, t: float) -> dict[str, npt.NDArray[Any]]:
         """Say how much has passed up to a time (s), if the network takes that."""
-        if self._told is None:
+        if self._elapsed_input is None:
             return {}
         window_s = self._filled_bins * self._bins.bin_us / _US_PER_S
         passed = window_s if self._before_s is None else max(t - self._before_s, 0.0)
-        return {self._told.name: np.full((1, 1), passed, dtype=self._told.kind)}
+        return {self._elapsed_input.name: np.full((1, 1), passed, dtype=self._elapsed_input.kind)}
 
 
 def _scaled(scale: float) -> str:

@@ -75,7 +75,7 @@ class FusedDetector(ModelEventDetector):
         """Take a picture (H, W, 3) of a time (s), on the clock of the events."""
         self._coming.append((t, frame))
 
-    def look_at(self, frame: RgbImage, t: float) -> Scan:
+    def scan_of(self, frame: RgbImage, t: float) -> Scan:
         """Return what is in a picture (H, W, 3) of a time (s) where there are no events.
 
         Raises:

@@ -144,7 +144,7 @@ class OutputReader:
         """Say how many boxes were left out because they had no numbers; empty if none were."""
         if not self.no_numbers:
             return ""
-        where = f"in {self._scans_without} of {self._scans} looks"
+        where = f"in {self._scans_without} of {self._scans} scans"
         return f"{self._path}: {self.no_numbers} boxes had no numbers (NaN or infinite), {where}: left out"
 
     def _with_numbers(self, found: DecodedBoxes) -> DecodedBoxes:

@@ -131,8 +131,8 @@ def _types(table: Trajectories, unknown: str) -> TextArray:
 def _recognise(head: FileHead) -> Certainty:
     """A first line of as many words as a label has, of which the third is no number."""
     words = head.line.split()
-    looks = len(words) >= len(_LABEL) and "," not in head.line and not is_number(words[2])
-    return Certainty.BY_CONTENT if looks else Certainty.NONE
+    fits = len(words) >= len(_LABEL) and "," not in head.line and not is_number(words[2])
+    return Certainty.BY_CONTENT if fits else Certainty.NONE
 
 
 FORMAT = BoxFormat(

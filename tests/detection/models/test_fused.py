@@ -104,7 +104,7 @@ def test_pictures_and_events_of_a_small_camera_fill_the_input(tmp_path):
     camera = (SIDE[0] // 2, SIDE[1] // 2)
     detector = FusedDetector(path, camera, times=FAST)
     white = np.full((camera[1], camera[0], 3), 255, dtype=np.uint8)
-    box = detector.look_at(white, 0.1).boxes[0]
+    box = detector.scan_of(white, 0.1).boxes[0]
     np.testing.assert_allclose(box, [(LEFT + OF_PICTURE) / 2, (TOP + 1.0) / 2, 5.0, 5.0], atol=1e-3)
 
 
@@ -164,7 +164,7 @@ def test_what_does_not_fit_is_refused(net, recording, tmp_path):
         ModelEventDetector(net, SIDE)
     detector = FusedDetector(net, (40, 40))
     with pytest.raises(DataError, match="pictures and events of the same pixels"):
-        detector.look_at(frame(), 0.0)
+        detector.scan_of(frame(), 0.0)
     with pytest.raises(ConfigError, match="takes the place of --detector-frames"):
         DetectRequest(frames=recording, detector_frames="sehn", detector_fused=str(net))
     with pytest.raises(ConfigError, match="'sehm' is no detector of both sensors"):

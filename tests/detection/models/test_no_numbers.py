@@ -42,7 +42,7 @@ def test_a_box_without_numbers_is_left_out_and_counted(tmp_path, column, value):
     for _ in range(3):
         np.testing.assert_allclose(np.sort(model(PICTURE, 0.0).scores), [0.7, 0.9], atol=1e-6)
     assert model.note().endswith(
-        "net.onnx: 3 boxes had no numbers (NaN or infinite), in 3 of 3 looks: left out"
+        "net.onnx: 3 boxes had no numbers (NaN or infinite), in 3 of 3 scans: left out"
     )
 
 
@@ -81,7 +81,7 @@ def test_the_command_says_it(tmp_path, capsys, share):
         assert "gave no numbers" in said
     else:
         assert code == 0
-        assert "8 boxes had no numbers (NaN or infinite), in 4 of 4 looks: left out" in said
+        assert "8 boxes had no numbers (NaN or infinite), in 4 of 4 scans: left out" in said
         assert np.isfinite(read_detections(out).boxes).all()
 
 

@@ -15,7 +15,7 @@ _MOST_PARTS = 12
 _SURE = 0.9
 
 
-def said_of_identities(identities: RunIdentities, number: int) -> list[str]:
+def identity_texts(identities: RunIdentities, number: int) -> list[str]:
     """Return lines on an identity and a causal track of one number.
 
     Args:
@@ -31,7 +31,7 @@ def said_of_identities(identities: RunIdentities, number: int) -> list[str]:
         if links is None:
             lines.append("a person has said so (--identities)")
         else:
-            lines += _said_of_links(links)
+            lines += _text_of_links(links)
     away = [one for one in identities.of_causal(number) if one.track_id != number]
     if away:
         named = _named(away, lambda one: f"identity {one.track_id}")
@@ -40,24 +40,24 @@ def said_of_identities(identities: RunIdentities, number: int) -> list[str]:
 
 
 def _named(parts: Sequence[IdentityPart], name: Callable[[IdentityPart], str]) -> str:
-    told = [f"{name(one)} ({one.first:.3f} to {one.last:.3f} s)" for one in parts[:_MOST_PARTS]]
+    lines = [f"{name(one)} ({one.first:.3f} to {one.last:.3f} s)" for one in parts[:_MOST_PARTS]]
     if len(parts) > _MOST_PARTS:
-        told.append(f"{len(parts) - _MOST_PARTS} more parts")
-    return ", ".join(told)
+        lines.append(f"{len(parts) - _MOST_PARTS} more parts")
+    return ", ".join(lines)
 
 
-def _said_of_links(links: IdentityLinks) -> list[str]:
+def _text_of_links(links: IdentityLinks) -> list[str]:
     joined = links.tail != links.head
-    told = [_said_of_link(links, k) for k in range(len(joined)) if joined[k] or links.probability[k] < _SURE]
+    lines = [_text_of_link(links, k) for k in range(len(joined)) if joined[k] or links.probability[k] < _SURE]
     if not joined.any():
-        told.insert(0, "no other causal track was joined to it")
-    left = len(joined) - len(told) + (not joined.any())
+        lines.insert(0, "no other causal track was joined to it")
+    left = len(joined) - len(lines) + (not joined.any())
     if left:
-        told.append(f"{left} more links within one causal track, each of probability {_SURE:g} or more")
-    return told
+        lines.append(f"{left} more links within one causal track, each of probability {_SURE:g} or more")
+    return lines
 
 
-def _said_of_link(links: IdentityLinks, k: int) -> str:
+def _text_of_link(links: IdentityLinks, k: int) -> str:
     from jeat_graph.association.linking import TERMS
 
     tail, head = int(links.tail[k]), int(links.head[k])
