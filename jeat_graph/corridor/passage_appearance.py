@@ -75,8 +75,8 @@ def check_appearance(cameras: Sequence[Passages]) -> None:
         for other in known:
             if other.appearance is not None and other.appearance.shape[1] != one.appearance.shape[1]:
                 raise DataError(
-                    f"--embeddings: those of {one.camera} have {one.appearance.shape[1]} numbers, those of "
-                    f"{other.camera} {other.appearance.shape[1]}: use one --embedder for all"
+                    f"--embeddings: those of {one.camera} have {one.appearance.shape[1]} numbers "
+                    f"and those of {other.camera} {other.appearance.shape[1]}: use one --embedder for all"
                 )
 
 
