@@ -226,8 +226,8 @@ def calibrate(
         truth: the truth of each; without it only sensors, their rates and their clocks are found.
         base: where all that is not estimated comes from.
         image: width and height of the picture (px), if not those of `base` or of a file beside.
-        tuned: with truth, keep the `even_score` of a sensor only where the tracks of the recordings are at
-            least as good with it.
+        tuned: with truth, keep the `even_score` and the `lasting_error` of a sensor only where the tracks of
+            the recordings are at least as good with it.
         options: how data frames and files are read, as for `track`.
 
     Returns:

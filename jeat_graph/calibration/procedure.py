@@ -1,13 +1,15 @@
-"""Calibration from beginning to end: sensors and their rates, clocks, and what scores mean."""
+"""Calibration from beginning to end: sensors, rates, clocks, what scores mean, how far boxes are off."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from jeat_graph.calibration.even_score import even_score
+from jeat_graph.calibration.lasting_error import lasting_error
 from jeat_graph.calibration.matches import SensorMatches, match_sensor
 from jeat_graph.calibration.offset import (
     Lag,
@@ -25,6 +27,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.eval.metrics import evaluate
+from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.runs.declaring import fit_input, own_picture
 from jeat_graph.runs.latency import taken_off
 from jeat_graph.tracking.whole import track
@@ -36,19 +39,19 @@ _DIGITS = 4
 
 
 @dataclass(frozen=True)
-class EvenScore:
-    """What scores of one sensor were found to mean.
+class MeasuredSetting:
+    """A setting of one sensor that was measured by the truth.
 
     Attributes:
         sensor: its name.
-        score: at which a box is as likely real as false; None where the boxes do not tell.
+        value: of the setting; None where the boxes do not tell.
         before, after: (MOTA + IDF1 + HOTA) / 3 of the recordings (per cent) without and with it; None
             where that was not asked.
         kept: whether it is in the configuration.
     """
 
     sensor: str
-    score: float | None
+    value: float | None
     before: float | None
     after: float | None
     kept: bool
@@ -62,11 +65,14 @@ class Calibration:
         config: what was found; `sensors.*.latency_s` is what was known of their clocks and what was found.
         lags: how late each sensor's times were found to be, beyond what the base knew.
         even_scores: what scores mean, sensor by sensor; empty without truth.
+        lasting_errors: what boxes are off as long as they show one object, of several sensors; empty of one,
+            and without truth.
     """
 
     config: Config
     lags: tuple[Lag, ...]
-    even_scores: tuple[EvenScore, ...] = ()
+    even_scores: tuple[MeasuredSetting, ...] = ()
+    lasting_errors: tuple[MeasuredSetting, ...] = ()
 
 
 def calibrate_with_truth(
@@ -81,8 +87,8 @@ def calibrate_with_truth(
     Args:
         recordings: detections, with the latencies that `base` knows taken off their times, and truth.
         base: configuration to begin with.
-        tuned: track the recordings, and keep the even score of a sensor only where that is no worse.
-        progress: called with the name of each sensor whose scores were judged.
+        tuned: track the recordings, and keep what was measured of a sensor only where that is no worse.
+        progress: called with the name of each setting that was judged.
 
     Raises:
         DataError: too little that matches.
@@ -94,8 +100,12 @@ def calibrate_with_truth(
     )
     # Each sensor by its own lag, early ones too: the truth stays where it is.
     pairs = _on_time(recordings, found_lags(lags))
-    config, found = _even_scores(pairs, base, tuned, progress)
-    return Calibration(with_lags(config, lags), tuple(lags), found)
+    trial = _Trial(pairs, base, tuned, progress)
+    scores = trial.measure("even_score", lambda matched: even_score(matched.score, matched.correct))
+    errors: tuple[MeasuredSetting, ...] = ()
+    if len(base.sensors) > 1:
+        errors = trial.measure("lasting_error", lambda matched: lasting_error(matched, ModelConstants()))
+    return Calibration(with_lags(trial.config, lags), tuple(lags), scores, errors)
 
 
 def calibrate_without_truth(recordings: Sequence[Detections], base: Config) -> Calibration:
@@ -150,37 +160,54 @@ def _lags_with_truth(recordings: Sequence[Recording], base: Config) -> list[Lag]
     return lags_from_truth(known, {name: 1.0 / base.sensors[name].rate_hz for name in known})
 
 
-def _even_scores(
-    recordings: Sequence[Recording],
-    config: Config,
-    tuned: bool,
-    progress: Callable[[str], None] | None,
-) -> tuple[Config, tuple[EvenScore, ...]]:
-    """Measure what the scores of each sensor mean, one sensor after the other."""
-    found: list[EvenScore] = []
-    before = _accuracy(recordings, config) if tuned else None
-    for name in config.sensor_names:
-        matched = _matches(recordings, config, name)
-        score = None if matched is None else even_score(matched.score, matched.correct)
-        if score is None:
-            found.append(EvenScore(name, None, before, None, False))
-            continue
-        score = float(f"{score:.{_DIGITS}g}")
-        known = replace(config.sensors[name], even_score=score)
-        changed = replace(config, sensors={**config.sensors, name: known})
-        after = _accuracy(recordings, changed) if tuned else None
-        kept = before is None or after is None or after >= before
-        found.append(EvenScore(name, score, before, after, kept))
-        if kept:
-            config, before = changed, after
-        if progress is not None:
-            progress(f"sensors.{name}.even_score")
-    return config, tuple(found)
-
-
 def _accuracy(recordings: Sequence[Recording], config: Config) -> float:
     """(MOTA + IDF1 + HOTA) / 3 of causal tracks (per cent), pooled."""
     pairs = [(truth, track(own_picture(config, detections), detections)) for detections, truth in recordings]
     instants = [np.unique(detections.scan_t) for detections, _ in recordings]
     scores = evaluate(pairs, kind="causal", instants=instants)
     return float(scores.MOTA + scores.IDF1 + scores.HOTA) / 3.0
+
+
+class _Trial:
+    """Settings of sensors, measured one after the other and kept where they do no harm.
+
+    Args:
+        recordings: detections, by the common clock, and truth.
+        config: to begin with; later with what was kept.
+        tuned: whether the recordings are tracked for that.
+        progress: called with the name of each setting that was judged.
+    """
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        config: Config,
+        tuned: bool,
+        progress: Callable[[str], None] | None,
+    ) -> None:
+        self._recordings, self._tuned, self._progress = recordings, tuned, progress
+        self.config = config
+        self._before = _accuracy(recordings, config) if tuned else None
+
+    def measure(
+        self, key: str, measured: Callable[[SensorMatches], float | None]
+    ) -> tuple[MeasuredSetting, ...]:
+        """Measure a setting of each sensor by its boxes that match the truth."""
+        return tuple(self._one(name, key, measured) for name in self.config.sensor_names)
+
+    def _one(self, name: str, key: str, measured: Callable[[SensorMatches], float | None]) -> MeasuredSetting:
+        matched, before = _matches(self._recordings, self.config, name), self._before
+        value = None if matched is None else measured(matched)
+        if value is None:
+            return MeasuredSetting(name, None, before, None, False)
+        value = float(f"{value:.{_DIGITS}g}")
+        given: dict[str, Any] = {key: value}
+        changed = {**self.config.sensors, name: replace(self.config.sensors[name], **given)}
+        config = replace(self.config, sensors=changed)
+        after = _accuracy(self._recordings, config) if self._tuned else None
+        kept = before is None or after is None or after >= before
+        if kept:
+            self.config, self._before = config, after
+        if self._progress is not None:
+            self._progress(f"sensors.{name}.{key}")
+        return MeasuredSetting(name, value, before, after, kept)

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add(
         "--no-tune",
         action="store_true",
-        help="keep every measured even_score, without tracking the recordings to check it",
+        help="keep every measured even_score and lasting_error, without tracking the recordings to check it",
     )
 
 
@@ -239,7 +239,8 @@ def describe(args: argparse.Namespace, picture: str, found: Calibration) -> str:
     lines = [f"Made by jeat-graph calibrate {__version__} from {len(args.detections)} recording(s):", names]
     if args.gt:
         lines.append(
-            "rates, clocks and what scores mean (even_score): from detections matched with the truth."
+            "rates, clocks, what scores mean (even_score) and, of several sensors, what boxes are off "
+            "(lasting_error): from detections matched with the truth."
         )
     else:
         lines.append(
@@ -263,8 +264,21 @@ def summary(config: Config, found: Calibration) -> list[Table]:
         }
         one = scores.get(name)
         if one is not None:
-            row["even score"] = one.score
+            row["even score"] = one.value
             row["accuracy without (%)"], row["with (%)"] = one.before, one.after
             row["kept"] = "yes" if one.kept else "no"
         rows.append(row)
-    return [Table.from_records(rows, title="Sensors", digits={"even score": 3})]
+    tables = [Table.from_records(rows, title="Sensors", digits={"even score": 3})]
+    if found.lasting_errors:
+        errors: list[dict[str, Cell]] = [
+            {
+                "sensor": one.sensor,
+                "lasting error": one.value,
+                "accuracy without (%)": one.before,
+                "with (%)": one.after,
+                "kept": "yes" if one.kept else "no",
+            }
+            for one in found.lasting_errors
+        ]
+        tables.append(Table.from_records(errors, title="Lasting errors", digits={"lasting error": 3}))
+    return tables
