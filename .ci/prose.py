@@ -24,7 +24,6 @@ RULES: tuple[tuple[str, str], ...] = (
     (r"\banew\b", "again; start over; reset"),
     (r"\btakers?\b", "the track that it is assigned to; recipient"),
     (r"\bindifferen(t|ce)\b", "decision threshold"),
-    (r"\b(told|tell) apart\b", "distinguish"),
     (r"\blonely\b", "seen by one sensor alone"),
     (r"\bfruitless\b", "without a confirmed track"),
     (r"\bunproven\b", "tentative"),
