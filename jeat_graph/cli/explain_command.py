@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from jeat_graph.cli.identity_texts import identity_texts
 from jeat_graph.cli.progress import stages
+from jeat_graph.cli.sensor_texts import sensor_texts
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.eval.tables import FORMATS
 
@@ -63,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Track the recording again and tell of a track, or of a place."""
+    from jeat_graph.runs.directory import read_record
     from jeat_graph.runs.explaining import explain_place, explain_tracks, run_to_explain
     from jeat_graph.runs.run_identities import identities_of_run
 
@@ -75,10 +77,11 @@ def run(args: argparse.Namespace) -> int:
         stage("reading")
         config, detections = run_to_explain(folder, args.detections)
         identities = None if args.track is None else identities_of_run(folder)
+        of_sensors = sensor_texts(config, read_record(folder).get("learnt", {}))
         stage("tracking again")
         if args.track is None:
             place = explain_place(config, detections, *args.at)
-            print("\n".join(_text_of_place(place, args.at, args.format)))
+            print("\n".join([*of_sensors, *_text_of_place(place, args.at, args.format)]))
             return 0
         wanted = [args.track]
         if identities is not None:
@@ -92,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
     for track_id in shown:
         lines += [""] * bool(lines)
         lines += _text_of_track(found[track_id], track_id, args.format)
-    print("\n".join(lines))
+    print("\n".join([*of_sensors, *lines]))
     if args.out is not None:
         from jeat_graph.drawing.explanation import plot_explanation
 

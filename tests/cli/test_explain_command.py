@@ -98,3 +98,24 @@ def test_a_place_must_read_as_one(folder):
     with pytest.raises(SystemExit) as stop:
         main(["explain", str(folder / "run"), "--at", "1;2;3"])
     assert stop.value.code == 2
+
+
+def test_of_several_sensors_it_says_what_is_known_of_them(tmp_path, capsys):
+    """The second one repeats its boxes to the pixel and is off by a quarter of every car."""
+    rows = ["t,sensor,left,top,width,height,score"]
+    for k in range(8 * SCANS):
+        for car in range(6):
+            x, y, off = 100 + 6 * k % 800, 60 + 100 * car, (-20, 20)[car % 2]
+            rows.append(f"{k / RATE_HZ},one,{x},{y},80,50,0.9")
+            rows.append(f"{k / RATE_HZ},two,{x + off},{y},80,50,0.8")
+    (tmp_path / "d.csv").write_text("\n".join(rows) + "\n")
+    settings = ["--set", "sensors.one.lasting_error=0", "--set", "sensors.two.score_weight=0.5"]
+    run = str(tmp_path / "run")
+    assert main(["track", str(tmp_path / "d.csv"), "--out", run, "--image", "1280x720", *settings]) == 0
+    capsys.readouterr()
+    assert main(["explain", run, "--track", "1"]) == 0
+    first, *others = capsys.readouterr().out.splitlines()
+    assert first.startswith("sensor two: its boxes are off by ")
+    assert "(learnt from the other sensors)" in first
+    assert "its scores count 0.5 times (as given)" in first
+    assert not any(line.startswith("sensor ") for line in others)
