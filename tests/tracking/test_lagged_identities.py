@@ -14,6 +14,8 @@ from jeat_graph.association.path_cover import Links
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import ConfigError, JeatGraphError
 from jeat_graph.live.late import LiveTracker, check_saved
+from jeat_graph.live.service.checking import tracker_config
+from jeat_graph.live.service.config import TrackedBy
 from jeat_graph.tracking.identities.passes import took
 from jeat_graph.tracking.identities.windows import (
     LagDecider,
@@ -161,6 +163,10 @@ def test_it_is_not_saved_and_says_so(tmp_path):
         tracker.save(tmp_path / "state.npz")
     with pytest.raises(ConfigError, match=r"--checkpoint does not go with smoother\.identities=lag"):
         check_saved(tracker, "--checkpoint")
+    asked = TrackedBy(set=("smoother.identities=lag",))
+    with pytest.raises(ConfigError, match="'lag' is not saved, and a service saves its state"):
+        tracker_config(asked, [], None, smoothed=True)
+    assert tracker_config(asked, [], None, smoothed=False).smoother.engine == "none"
     with pytest.raises(ConfigError, match="'lag' needs another engine"):
         load_config("paper", ["smoother.identities=lag"])
 
