@@ -64,7 +64,7 @@ class Backbone(nn.Module):
         self.traces: Traces | None = None
         self.lasting = nn.ModuleList()
         if has_memory and settings.by_time:
-            self.lasting.extend(Lasting(channels, stride) for channels, stride in self.states)
+            self.lasting.extend(Lasting(*state, settings.memory_keep) for state in self.states)
             self.traces = Traces(settings, fine)
             self.states = (*self.states, (TRACE_CHANNELS, CELL_PX))
 

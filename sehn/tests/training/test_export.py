@@ -100,6 +100,26 @@ def test_the_file_is_recognised_and_runs(pair, engine):
     assert len(scan.boxes) > 0
 
 
+def test_a_memory_by_time_is_told_how_much_has_passed(tmp_path, monkeypatch):
+    """The window's length at first and after a leap of the clock, else the time since the window before."""
+    write_onnx(
+        DetectionNet(NetSettings(kind="events", width=2, memory="time")).eval(), SIDE, {}, tmp_path / "n.onnx"
+    )
+    detector = ModelEventDetector(tmp_path / "n.onnx", SIDE, times=EventSettings(rate_hz=50.0))
+    told, run = [], detector._engine.run
+
+    def noted(inputs):
+        told.append(float(inputs["elapsed"][0, 0]))
+        return run(inputs)
+
+    monkeypatch.setattr(detector._engine, "run", noted)
+    for begin_us in (0, 100_000_000):
+        t = begin_us + np.arange(0, 106_000, 500)
+        ones = np.ones(len(t), dtype=np.uint16)
+        detector.push(EventArray(t, ones, ones, ones.astype(np.uint8)))
+    assert told == pytest.approx([0.05, 0.02, 0.02] * 2, abs=1e-6)
+
+
 def summed(summand_shape):
     """A convolution to which the same is added at each cell."""
     onnx = pytest.importorskip("onnx", reason="pip install onnx")

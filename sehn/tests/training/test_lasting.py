@@ -11,8 +11,16 @@ import pytest
 torch = pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
 
 from jeat_graph.detection.models.onnx_head import read_onnx_head  # noqa: E402
+from jeat_graph_sehn.training.blocks import ConvGru  # noqa: E402
 from jeat_graph_sehn.training.export import write_onnx  # noqa: E402
-from jeat_graph_sehn.training.lasting import SPANS_S, TRACE_CHANNELS, Lasting, Traces  # noqa: E402
+from jeat_graph_sehn.training.lasting import (  # noqa: E402
+    SPANS_S,
+    TRACE_CHANNELS,
+    Lasting,
+    SinceThen,
+    Traces,
+    remembered_by_time,
+)
 from jeat_graph_sehn.training.making import new_network, read_network  # noqa: E402
 from jeat_graph_sehn.training.network import DetectionNet  # noqa: E402
 from jeat_graph_sehn.training.settings import NetSettings  # noqa: E402
@@ -84,24 +92,44 @@ def test_activity_is_in_units_of_the_noise(times):
 
 
 def test_a_state_lasts_by_time_and_not_by_windows():
-    lasting = Lasting(6, 8)
+    lasting = Lasting(6, 8, 0.9)
+    torch.nn.init.normal_(lasting.log_hz)
     once = lasting.shares(torch.tensor([0.1]))
     often = lasting.shares(torch.full((5,), 0.02)).prod(dim=0, keepdim=True)
     torch.testing.assert_close(once, often)
-    assert once.min() > 0.8
-    assert (once[0, 1:] > once[0, :-1]).all(), "each channel has a time constant of its own"
+    assert len(set(once.flatten().tolist())) == 6, "each channel has a time constant of its own"
 
 
-def test_where_no_more_comes_than_noise_little_changes():
-    """The shares that opens are bounded by the gate: of a vehicle that stands most is kept."""
-    torch.manual_seed(3)
-    lasting = Lasting(6, 16)
+@pytest.mark.parametrize(("keep", "left"), [(0.9, 0.9), (0.5, 0.5), (1.0, 0.9988), (0.0, 0.4966)])
+def test_at_first_a_state_lasts_as_one_that_goes_by_windows_of_the_usual_length(keep, left):
+    """But for one that would last for ever or not at all: between 0.05 and 30 s."""
+    found = Lasting(3, 8, keep).shares(torch.tensor([0.035])).flatten()
+    torch.testing.assert_close(found, torch.full((3,), left), atol=1e-4, rtol=0.0)
+
+
+def test_the_gate_opens_by_the_most_that_comes_in_a_cell():
+    lasting = Lasting(6, 16, 0.9)
+    with torch.no_grad():
+        lasting.open.bias.fill_(-4.0)
     activity = torch.zeros(1, 6, 8, 12)
-    activity[:, :, :4, :4] = 4.0
+    activity[:, :, 2, 3] = 4.0
     opened = lasting.opened(activity)
     assert opened.shape == (1, 6, 2, 3)
     assert opened[0, :, 0, 0].min() > 0.95
     assert opened[0, :, 1, 2].max() < 0.05
+
+
+def test_a_gate_that_is_closed_leaves_a_state_as_it_was_but_for_time():
+    torch.manual_seed(3)
+    memory, lasting = ConvGru(4), Lasting(4, 8, 0.9)
+    with torch.no_grad():
+        lasting.open.bias.fill_(-50.0)
+    state, elapsed = torch.rand(1, 4, 4, 6), torch.full((3,), 0.05)
+    with torch.no_grad():
+        _, last = remembered_by_time(
+            memory, lasting, torch.rand(3, 4, 4, 6), state, 3, SinceThen(elapsed, torch.zeros(3, 6, 8, 12))
+        )
+    torch.testing.assert_close(last, state * lasting.shares(torch.tensor([0.15])))
 
 
 def test_a_network_that_went_by_windows_goes_on_by_time(tmp_path):
