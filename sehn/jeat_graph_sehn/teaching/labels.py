@@ -13,6 +13,7 @@ What a detector believed to see and no track took is masked, too. All else is ba
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -84,6 +85,13 @@ class TrackLabels:
     def masking(self, rows: BoolArray) -> TrackLabels:
         """Return the same with more boxes masked."""
         return replace(self, truth=replace(self.truth, ignore=self.truth.ignore | rows))
+
+    def digest(self) -> str:
+        """Return a checksum (SHA-256) of all that is said."""
+        truth, found = self.truth, hashlib.sha256()
+        for part in (truth.t, truth.object_id, truth.boxes, truth.ignore, truth.frame_times(), self.weight):
+            found.update(np.ascontiguousarray(part).tobytes())
+        return found.hexdigest()
 
     def asked_objects(self) -> IntArray:
         """Return the ids of the vehicles that are asked for at any time, ascending."""

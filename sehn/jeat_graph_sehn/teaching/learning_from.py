@@ -184,8 +184,8 @@ def teach(
         "settings": asdict(settings),
         "side": list(side),
         "start": [{"name": request.start.name, "sha256": sha256_of(request.start)}],
-        "taught": request.about,
-        "old": [path.name for path in request.old],
+        "taught": {**request.about, "labels": [labels.digest() for labels in request.lesson.parts]},
+        "old": [_described(path) for path in request.old],
         "old_share": request.old_share,
     }
     start = new_network(net, (request.start,))
@@ -274,6 +274,12 @@ def _pictures(
         Picture(name, name, StoredPicture(path), truth.at(t))
         for path, t in zip(paths, stills.times.tolist(), strict=True)
     ]
+
+
+def _described(path: Path) -> dict[str, str]:
+    """Return what a data set is: its name, and the checksum of what it says of itself."""
+    manifest = path / "manifest.json"
+    return {"name": path.name, **({"sha256": sha256_of(manifest)} if manifest.is_file() else {})}
 
 
 def _old(request: TeachRequest) -> Split[Any]:

@@ -113,6 +113,13 @@ def test_a_mask_lasts_until_the_detector_looks_again():
     assert len(set(ids.tolist())) == 1
 
 
+def test_other_labels_have_another_digest():
+    labels = labels_of(tracks(TIMES), scans(TIMES))
+    assert labels.digest() == labels_of(tracks(TIMES), scans(TIMES)).digest()
+    assert labels.digest() != labels_of(tracks(TIMES, existence=0.9), scans(TIMES)).digest()
+    assert labels.digest() != labels.masking(labels.truth.t == TIMES[9]).digest()
+
+
 def test_labels_stand_at_times_that_are_apart():
     assert spread_times(np.array([0.0, 0.01, 0.05, 0.06, 0.2])).tolist() == [0.0, 0.05, 0.2]
 
