@@ -218,10 +218,12 @@ def _start(args: argparse.Namespace) -> Path:
         DataError: `train` did not make it.
     """
     from jeat_graph.data.errors import DataError
-    from jeat_graph.detection.named import network_file
+    from jeat_graph.detection.named import AUTO, MOTION, network_file
     from jeat_graph_sehn.teaching.learning_from import check_teachable
 
     kind = "events" if args.events else "frames"
+    if args.detector in (AUTO, MOTION):
+        raise ConfigError(f"--detector: {args.detector} has no weights that could learn: name a network")
     path = network_file(args.detector, kind)
     try:
         check_teachable(path, kind)

@@ -63,6 +63,19 @@ def test_what_does_not_go_together_is_said_first(capsys, words, said):
     assert said in refused(capsys, "d.csv", *words)
 
 
+@pytest.mark.parametrize(
+    ("detector", "said"),
+    [
+        ("motion", "motion has no weights that could learn"),
+        ("sehn-int8", "8-bit numbers, which cannot learn"),
+    ],
+)
+def test_detectors_that_cannot_learn_are_refused_by_name(tmp_path, capsys, detector, said):
+    pytest.importorskip("torch", reason="teaching needs PyTorch, the extra `train`")
+    line = refused(capsys, "d.csv", "--events", "e.h5", "--detector", detector, "--out", tmp_path / "n.onnx")
+    assert said in line
+
+
 def test_a_short_recording_is_refused_with_what_would_be_needed(tmp_path, capsys):
     write_recording(tmp_path, 3.0)
     out = tmp_path / "set"
