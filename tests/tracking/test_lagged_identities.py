@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -219,3 +220,20 @@ def test_of_a_recording_that_goes_on_births_and_exits_are_counted_from_its_begin
     ]
     # Twenty births more in the interior: the second piece is likelier to be another one.
     assert gains[0] - gains[1] > 2.0
+
+
+def test_where_time_goes_on_from_another_moment_no_row_is_lost():
+    scans, tables = street(seconds=4.0, gap=(99.0, 99.0)), []
+    for changes in (LAG, SIZE):
+        tracker, parts = Tracker(load_config("default", changes)), []
+        for k, scan in enumerate(scans):
+            if k == 50:
+                tracker.reset(0.0)
+            tracker.step(scan if k < 50 else replace(scan, t=scan.t - 2.4))
+            if k % 9 == 0:
+                parts.append(tracker.drain_smoothed())
+        tables.append(Trajectories.concatenate([*parts, tracker.finish()]))
+    rows, causal = (one.take(np.lexsort((one.t, one.track_id))) for one in tables)
+    assert len(set(rows.track_id.tolist())) == 6
+    assert np.array_equal(rows.track_id, causal.track_id)
+    assert np.array_equal(rows.boxes, causal.boxes)

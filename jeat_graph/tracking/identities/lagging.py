@@ -112,7 +112,7 @@ class LagSmoother:
         self._beside: list[Trajectories] = []  # causal rows of identities that are followed
         self._followed: list[tuple[IntArray, FloatArray]] = []  # identities and times of rows of these
         self._decided_s = -math.inf  # time of the last step that is decided
-        self._leapt = False  # whether time has gone on from another moment since rows were given out
+        self._ready: list[Trajectories] = []  # rows of before time went on from another moment
         self._said: list[_Said] = []
         self._links: list[IdentityLinks] = []
 
@@ -137,26 +137,35 @@ class LagSmoother:
 
     def reset(self, tracker: ModelTracker, t: float) -> None:
         """Decide all that came, and let time go on from another moment (s)."""
-        self._decide(tracker, final=True)
+        self._ready.append(self._all_rows(tracker))
         self._decider.reset()
-        self._leapt = True
         if self._follower is not None:
             self._follower.reset(t)
+        self._whole, self._label, self._said = _Whole(), {}, []
+        self._beside, self._followed, self._decided_s = [], [], -math.inf
+
+    def _all_rows(self, tracker: ModelTracker, causal: Trajectories | None = None) -> Trajectories:
+        """Decide the rest, end all tracks and return the rows that are left; `causal` if they are known."""
+        self._decide(tracker, final=True)
+        if causal is None:
+            causal = tracker._smoothed_table(tracker._model.finish())
+        follower, followed = self._follower, []
+        if follower is not None:
+            followed = [follower._smoothed_table(follower._model.finish())]
+        return self._rows(causal, followed, math.inf)
 
     def drain(self, causal: Trajectories) -> Trajectories:
         """Return the rows that have become final, given those of the causal smoother that have."""
         followed = [] if self._follower is None else [self._follower.drain_smoothed()]
         limit = self._decided_s - _LAGS_KEPT * self._lag_s if self._has_lag else -math.inf
-        out = self._rows(causal, followed, math.inf if self._leapt else limit)
-        self._leapt = False
+        out = Trajectories.concatenate([*self._ready, self._rows(causal, followed, limit)])
+        self._ready = []
         self._forget()
         return out
 
     def finish(self, tracker: ModelTracker, causal: Trajectories) -> Trajectories:
         """Decide the rest and return all rows that are left."""
-        self._decide(tracker, final=True)
-        followed = [] if self._follower is None else [self._follower.finish()]
-        return self._rows(causal, followed, math.inf)
+        return Trajectories.concatenate([*self._ready, self._all_rows(tracker, causal)])
 
     def settle(self) -> None:
         """Have the second smoother be as one that was saved and loaded."""
@@ -207,6 +216,7 @@ class LagSmoother:
         is_whole = np.isinf(until) & (until > 0.0)
         undecided = np.where(is_whole, waiting.t > last, waiting.t > self._decided_s)
         undecided |= ~np.isin(waiting.track_id, list(whole.of_causal)) & (waiting.t > self._decided_s)
+        undecided &= limit < math.inf
         kept = ~undecided & (waiting.t <= until) & (owner > 0)
         parts = [replace(waiting.take(kept), track_id=owner[kept])]
         self._beside.append(self._owned(waiting.take(~undecided & (waiting.t > until))))
