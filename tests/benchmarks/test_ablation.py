@@ -18,8 +18,10 @@ from jeat_graph.io.tables.detections_io import write_detections
 from jeat_graph.io.tables.truth_io import write_truth
 
 SHIPPED = ModelConstants()
-#: Found only where something cuts boxes, where two sensors differ in size, or where scores tell little.
+#: Found only where something cuts boxes, where two sensors differ in size, where scores tell little, or where
+#: a sensor is alone, or worse than what sides of compared sensors have at least.
 QUIET = {
+    "learnt box noise",
     "sides that show again",
     "the decision threshold (fixed at even odds)",
     "gaps that begin with a box that confirms",

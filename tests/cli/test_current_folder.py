@@ -69,7 +69,7 @@ def test_every_command_from_a_folder_of_strange_modules(trap, recording):
         ["stream", "--help"],
         ["road", "run", "--camera", "none.yaml", "--out", "road"],
         ["detectors", "--no-speed"],
-        *([name, "--help"] for name in (*NO_PICTURES, "handover", "recount", "conflicts")),
+        *([name, "--help"] for name in (*NO_PICTURES, "handover", "recount", "conflicts", "teach")),
     ]
     assert {command[0] for command in commands} | SERVED_ELSEWHERE == set(COMMANDS)
     done = subprocess.run(

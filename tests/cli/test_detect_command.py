@@ -155,7 +155,7 @@ def test_a_real_street_from_one_file(tmp_path):
     lives = table.groupby("track_id").t.agg(["min", "max"])
     long = lives[lives["max"] - lives["min"] > 1.0]
     assert len(long) == 3
-    np.testing.assert_allclose(sorted(long["min"]), [0.0, 0.0, 1.2], rtol=0, atol=0.1)
+    np.testing.assert_allclose(sorted(long["min"]), [0.0, 0.0, 1.2], rtol=0, atol=0.2)
     assert (long["max"] > 2.3).all()
     # The parked van does not move, so nobody sees it.
     assert not ((table.x - 170).abs() + (table.y - 171).abs() < 10).any()

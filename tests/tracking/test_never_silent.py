@@ -34,7 +34,7 @@ def drawn_pair(rng):
 
 
 def scan_of(sensor, place, size, rng):
-    """Boxes (M, 4) left, top, right, bottom and scores (M,) of one look."""
+    """Boxes (M, 4) left, top, width, height and scores (M,) of one scan."""
     seen = rng.random(len(place)) < sensor["p_detect"]
     wide = (size * sensor["scale"])[seen]
     boxes = np.concatenate([place[seen] - wide / 2, place[seen] + wide / 2], axis=1)
@@ -42,7 +42,10 @@ def scan_of(sensor, place, size, rng):
     stray = rng.uniform(0.0, PICTURE - 40.0, (rng.poisson(sensor["clutter"]), 2))
     false = np.concatenate([stray, stray + rng.uniform(20.0, 120.0, stray.shape)], axis=1)
     means = np.repeat([sensor["score"], sensor["score"] - 0.25], [len(boxes), len(false)])
-    return np.concatenate([boxes, false]), rng.normal(means, sensor["spread"]).clip(0.01, 0.99)
+    sides = np.concatenate([boxes, false])
+    return np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], axis=1), rng.normal(
+        means, sensor["spread"]
+    ).clip(0.01, 0.99)
 
 
 def share_tracked(seed):
