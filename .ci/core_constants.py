@@ -34,6 +34,7 @@ CONSTANTS: dict[str, dict[str, dict[str, str]]] = {
         "jeat_graph.filters.sensor_accuracy": {
             "kSweeps": "_SWEEPS",
             "kLeastShare": "_LEAST_SHARE",
+            "kToSides": "_TO_SIDES",
         },
         "jeat_graph.filters.visibility": {
             "kVisible": "VISIBLE",

@@ -22,6 +22,7 @@ inline constexpr double kLeastPerspective = 1e-06;
 // filters.sensor_accuracy
 inline constexpr int kSweeps = 50;
 inline constexpr double kLeastShare = 1e-12;
+inline constexpr std::array<double, 4> kToSides{0.5, 0.5, 0.125, 0.125};
 // filters.visibility
 inline constexpr int kVisible = 0;
 inline constexpr int kHidden = 1;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "constants.hpp"
@@ -13,8 +14,6 @@
 #include "math.hpp"
 
 namespace jeat::filters {
-
-inline constexpr std::array<double, 4> kToSides{0.5, 0.5, 0.125, 0.125};
 
 struct AccuracySums {
     std::vector<double> pairs, product;  // (S, S)
@@ -41,62 +40,56 @@ struct AccuracySums {
     void solve(const std::vector<double>& log_side_variance, const std::vector<double>& p_detect,
                const std::vector<double>& given, const ModelConstants& c) {
         const std::size_t S = sensors();
+        std::vector<double> both(S * S), weight(S * S);
+        const std::vector<std::uint8_t> hat = in_triangles(c);
         for (std::size_t i = 0; i < S; ++i) lasting[i] = std::isnan(given[i]) ? 0.0 : given[i];
-        const std::vector<double> known = lasting;
+        for (std::size_t at = 0; at < S * S; ++at) {
+            both[at] = std::max(product[at] / (pairs[at] + c.lasting_count), 0.0);
+            weight[at] = hat[at / S] && hat[at % S] ? pairs[at] : 0.0;
+        }
+        const std::vector<double> known = lasting, none(S, 0.0);
+        // What sensor k's differences say of it, with the others' V as they are.
+        const auto least_squares = [&](std::size_t k, const std::vector<double>& others) {
+            double sum = 0.0, total = 0.0;
+            for (std::size_t j = 0; j < S; ++j) {
+                sum += weight[k * S + j] * (both[k * S + j] - others[j]);
+                total += weight[k * S + j];
+            }
+            return sum / total;
+        };
         std::vector<std::size_t> learnt;
         for (std::size_t i = 0; i < S; ++i) {
             if (!std::isnan(given[i])) continue;
-            if (in_triangle(i, c)) {
+            if (hat[i]) {
                 learnt.push_back(i);
+                lasting[i] = least_squares(i, none) / 2.0;
                 continue;
             }
             double sum = 0.0, number = 0.0;
             for (std::size_t j = 0; j < S; ++j) {
-                const double own = std::isnan(given[j]) ? beyond(i, j, log_side_variance, c) * share(p_detect[i], p_detect[j])
-                                                        : std::max(both(i, j, c) - known[j], 0.0);
-                sum += pairs[i * S + j] * own;
+                const double held = c.error_share * (exp_of(log_side_variance[i]) + exp_of(log_side_variance[j]));
+                const double beyond = std::max(both[i * S + j] - held, 0.0), rest = std::max(both[i * S + j] - known[j], 0.0);
+                sum += pairs[i * S + j] * (std::isnan(given[j]) ? beyond * share(p_detect[i], p_detect[j]) : rest);
                 number += pairs[i * S + j];
             }
             if (number > 0.0) lasting[i] = sum / number;
         }
-        std::vector<double> first(S, 0.0);
-        for (const std::size_t k : learnt) first[k] = least_squares(k, {}, c) / 2.0;
-        for (const std::size_t k : learnt) lasting[k] = first[k];
         for (int sweep = 0; sweep < kSweeps; ++sweep)
-            for (const std::size_t k : learnt) lasting[k] = std::max(0.0, least_squares(k, lasting, c));
+            for (const std::size_t k : learnt) lasting[k] = std::max(0.0, least_squares(k, lasting));
     }
 
 private:
-    double both(std::size_t i, std::size_t j, const ModelConstants& c) const {
-        const std::size_t at = i * sensors() + j;
-        return std::max(product[at] / (pairs[at] + c.lasting_count), 0.0);
-    }
-    double beyond(std::size_t i, std::size_t j, const std::vector<double>& log_side_variance,
-                  const ModelConstants& c) const {
-        const double held = c.error_share * (exp_of(log_side_variance[i]) + exp_of(log_side_variance[j]));
-        return std::max(both(i, j, c) - held, 0.0);
-    }
     static double share(double p, double other) { return (1.0 - p) / std::max(2.0 - p - other, kLeastShare); }
 
-    bool in_triangle(std::size_t i, const ModelConstants& c) const {
+    // Which sensors were compared enough with two others that were compared with each other.
+    std::vector<std::uint8_t> in_triangles(const ModelConstants& c) const {
         const std::size_t S = sensors();
         const auto known = [&](std::size_t a, std::size_t b) { return pairs[a * S + b] >= c.lasting_count; };
-        for (std::size_t j = 0; j < S; ++j)
-            for (std::size_t k = 0; k < S; ++k)
-                if (known(i, j) && known(j, k) && known(k, i)) return true;
-        return false;
-    }
-
-    // What sensor k's differences say of it, the others' V as they are; none: 0.
-    double least_squares(std::size_t k, const std::vector<double>& others, const ModelConstants& c) const {
-        const std::size_t S = sensors();
-        double sum = 0.0, total = 0.0;
-        for (std::size_t j = 0; j < S; ++j) {
-            const double weight = in_triangle(j, c) ? pairs[k * S + j] : 0.0;
-            sum += weight * (both(k, j, c) - (others.empty() ? 0.0 : others[j]));
-            total += weight;
-        }
-        return sum / total;
+        std::vector<std::uint8_t> out(S, 0);
+        for (std::size_t i = 0; i < S; ++i)
+            for (std::size_t j = 0; j < S && !out[i]; ++j)
+                for (std::size_t k = 0; k < j && !out[i]; ++k) out[i] = known(i, j) && known(j, k) && known(k, i);
+        return out;
     }
 };
 
