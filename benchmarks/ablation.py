@@ -78,14 +78,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.epilog = "example: python -m benchmarks ablation RECORDINGS --readme docs/method.md"
     common.declare(parser, _NAME, {"seeds": "of the simulated recordings (0)"})
+    common.declare_root(parser, "the recordings")
     add = parser.add_argument
-    add(
-        "root",
-        nargs="?",
-        default=common.SHARED,
-        metavar="ROOT",
-        help=f"folder of the recordings ({common.SHARED})",
-    )
     add("--rate", type=positive, metavar="HZ", help="frame rate where the files do not say it")
     add("--sets", nargs="+", metavar="NAME", help="take these sets of the folder alone")
     add("--terms", nargs="+", choices=list(TERMS), metavar="TERM", help="judge these terms alone")

@@ -29,6 +29,18 @@ _OPTIONAL: Mapping[str, dict[str, Any]] = {
 }
 
 
+def declare_root(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare the folder of recordings that a benchmark is of; without it that beside the checkout.
+
+    Args:
+        parser: of the benchmark.
+        what: is in the folder.
+    """
+    parser.add_argument(
+        "root", nargs="?", default=SHARED, metavar="ROOT", help=f"folder of {what} ({SHARED})"
+    )
+
+
 def declare(parser: argparse.ArgumentParser, name: str, texts: Mapping[str, str]) -> None:
     """Declare the arguments that every benchmark has, and of `_OPTIONAL` those that it has a text for.
 

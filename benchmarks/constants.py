@@ -52,14 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "example: python -m benchmarks constants RECORDINGS --only jerk gap_prior --cache counts.jsonl"
     )
     common.declare(parser, _NAME, {"seeds": "of the random starts (0)"})
+    common.declare_root(parser, "the recordings")
     add = parser.add_argument
-    add(
-        "root",
-        nargs="?",
-        default=common.SHARED,
-        metavar="ROOT",
-        help=f"folder of the recordings ({common.SHARED})",
-    )
     add("--rate", type=positive, metavar="HZ", help="frame rate where the files do not say it")
     add("--sets", nargs="+", metavar="NAME", help="take these sets alone; at least two")
     add("--only", nargs="+", metavar="NAME", help="move these constants alone (all)")

@@ -46,13 +46,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     kind = parser.prog.split()[-1]
     declare_trackers(parser, kind)
     add = parser.add_argument
-    given: dict[str, Any] = {"nargs": "?", "default": common.SHARED} if kind == "real" else {}
-    add(
-        "root",
-        metavar="ROOT",
-        help="folder of the recordings" + (f" ({common.SHARED})" if given else ""),
-        **given,
-    )
+    if kind == "real":
+        common.declare_root(parser, "the recordings")
+    else:
+        add("root", metavar="ROOT", help="folder of the recordings")
     add(
         "--detections",
         action="append",

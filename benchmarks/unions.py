@@ -45,14 +45,8 @@ class UnionJob(NamedTuple):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the benchmark's arguments."""
     common.declare(parser, "unions", {})
+    common.declare_root(parser, "recordings with detections and truth")
     add = parser.add_argument
-    add(
-        "root",
-        nargs="?",
-        default=common.SHARED,
-        metavar="ROOT",
-        help=f"folder of recordings with detections and truth ({common.SHARED})",
-    )
     add("--rate", type=positive, default=25.0, metavar="HZ", help="frames per second where not known (25)")
     add("--draws", type=counting, default=10, metavar="N", help="draws of each recording (10)")
     add("--sets", nargs="+", metavar="NAME", help="only these sets")
