@@ -111,6 +111,23 @@ class IdentityDecision:
         return cls(owner, causal, sure, none, none, nothing, nothing, no_terms)
 
 
+class BestChains(NamedTuple):
+    """The best cover of pieces.
+
+    Attributes:
+        chain: (N,) chain of each detection, -1 where it is of no piece.
+        probability, tail, head, log_ratio, joined, terms: as `IdentityDecision` has them.
+    """
+
+    chain: IntArray
+    probability: FloatArray
+    tail: IntArray
+    head: IntArray
+    log_ratio: FloatArray
+    joined: FloatArray
+    terms: FloatArray
+
+
 def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelConstants) -> IdentityDecision:
     """Decide who is who.
 
@@ -131,27 +148,43 @@ def decide(recording: Recording, passes: list[Pass], backward: Pass, c: ModelCon
     piece = number[piece] if len(piece) else piece
     if not (piece >= 0).any():
         return IdentityDecision.without_links(np.zeros_like(causal), causal)
-    members = members_of(piece)
-    found, causal_cover = joined_pieces(recording, members, piece, assigned, c)
+    best = best_chains(recording, piece, assigned, c)
+    owner = np.zeros(len(causal), dtype=np.int64)
+    of = with_weak(seen, causal, piece, best.chain)
+    owner[of >= 0] = _named(of[of >= 0], causal[of >= 0], int(causal.max()))
+    return IdentityDecision(owner, causal, *best[1:])
+
+
+def best_chains(
+    recording: Recording, piece: IntArray, assigned: IntArray, c: ModelConstants, so_far: SoFar | None = None
+) -> BestChains:
+    """Return the best cover of pieces, ties as the causal pass has them.
+
+    Args:
+        recording: the detections.
+        piece: (N,) piece of each, -1 for none.
+        assigned: (R, N) who took them in every pass, of which the first is causal.
+        c: constants.
+        so_far: what was decided before; None for a whole recording.
+    """
+    used, of, probability = piece >= 0, np.full(len(piece), -1), np.ones(len(piece))
+    if not used.any():
+        none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
+        return BestChains(of, probability, none, none, nothing, nothing, np.zeros((0, len(TERMS))))
+    members = _members(piece)
+    found, causal_cover = _joined(recording, members, piece, assigned, c, so_far)
     cover = preferring(found.links, found.cover, causal_cover, TIE)
     chain = chains(found.links, cover)
-    owner = np.zeros(len(causal), dtype=np.int64)
-    used = piece >= 0
-    of = np.full(len(causal), -1)
     of[used] = chain[piece[used]]
-    of = with_weak(seen, causal, piece, of)
-    owner[of >= 0] = _named(of[of >= 0], causal[of >= 0], int(causal.max()))
     made = cover[cover >= 0]
-    drawn, share = drawn_covers(found.links, cover)
-    probability = np.ones(len(causal))
-    probability[used] = together(drawn, found.links, chain, members)[piece[used]]
+    drawn, share = _drawn(found.links, cover)
+    probability[used] = _together(drawn, found.links, chain, members)[piece[used]]
     tail = np.array([members[k][-1] for k in found.links.tail[made]], dtype=np.int64)
     head = np.array([members[k][0] for k in found.links.head[made]], dtype=np.int64)
-    gain, terms = found.links.gain[made], found.terms[made]
-    return IdentityDecision(owner, causal, probability, tail, head, gain, share[made], terms)
+    return BestChains(of, probability, tail, head, found.links.gain[made], share[made], found.terms[made])
 
 
-def joined_pieces(
+def _joined(
     recording: Recording,
     members: list[IntArray],
     piece: IntArray,
@@ -233,7 +266,7 @@ def log_odds(p: FloatArray) -> FloatArray:
     return np.log(p / (1.0 - p))
 
 
-def members_of(piece: IntArray) -> list[IntArray]:
+def _members(piece: IntArray) -> list[IntArray]:
     """Return the detections of each piece in order of time; those below 0 are none."""
     order = np.argsort(piece, kind="stable")
     bounds = np.searchsorted(piece[order], np.arange(int(piece.max(initial=-1)) + 2))
@@ -360,7 +393,7 @@ def _named(chain: IntArray, causal: IntArray, most: int) -> IntArray:
     return name[code.reshape(-1)]
 
 
-def drawn_covers(links: Links, cover: IntArray) -> tuple[IntArray, FloatArray]:
+def _drawn(links: Links, cover: IntArray) -> tuple[IntArray, FloatArray]:
     """Return covers drawn by their probability, and the share (E,) of them that has each link."""
     if not len(links.gain):
         return cover[None], np.zeros(0)
@@ -378,7 +411,7 @@ def drawn_covers(links: Links, cover: IntArray) -> tuple[IntArray, FloatArray]:
     return whole, shares(whole, len(links.gain))
 
 
-def together(drawn: IntArray, links: Links, chain: IntArray, members: list[IntArray]) -> FloatArray:
+def _together(drawn: IntArray, links: Links, chain: IntArray, members: list[IntArray]) -> FloatArray:
     """Return how often each piece (P,) is drawn in one chain with the longest piece of its own chain."""
     length = np.array([len(one) for one in members])
     order = np.lexsort((np.arange(len(length)), -length, chain))

@@ -17,7 +17,6 @@ import numpy as np
 
 from jeat_graph.association import agreement
 from jeat_graph.association.linking import TERMS, Past
-from jeat_graph.association.path_cover import chains, preferring
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.identity_links import IdentityLinks
@@ -271,26 +270,11 @@ class LagDecider:
         number[told] = np.arange(told.sum())
         place = number[piece]
         used = place >= 0
-        probability = np.ones(len(piece))
-        of = np.full(len(piece), -1)
-        none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
-        joined = (none, none, nothing, nothing, np.zeros((0, len(TERMS))))
-        if used.any():
-            members = deciding.members_of(place)
-            looked = np.array([step.t for step in self._steps])
-            so_far = SoFar(owner[told] > 0, self._past, float(self._begun or 0.0), self._looks)
-            recording = Recording(seen, looked, scene)
-            votes = np.stack([rows.causal, np.where(back > 0, back, -rows.causal - 1)])
-            found, causal_cover = deciding.joined_pieces(recording, members, place, votes, c, so_far)
-            cover = preferring(found.links, found.cover, causal_cover, deciding.TIE)
-            chain = chains(found.links, cover)
-            of[used] = chain[place[used]]
-            drawn, share = deciding.drawn_covers(found.links, cover)
-            probability[used] = deciding.together(drawn, found.links, chain, members)[place[used]]
-            made = cover[cover >= 0]
-            tail = np.array([members[k][-1] for k in found.links.tail[made]], dtype=np.int64)
-            head = np.array([members[k][0] for k in found.links.head[made]], dtype=np.int64)
-            joined = (tail, head, found.links.gain[made], share[made], found.terms[made])
+        looked = np.array([step.t for step in self._steps])
+        so_far = SoFar(owner[told] > 0, self._past, float(self._begun or 0.0), self._looks)
+        votes = np.stack([rows.causal, np.where(back > 0, back, -rows.causal - 1)])
+        best = deciding.best_chains(Recording(seen, looked, scene), place, votes, c, so_far)
+        of = best.chain
         # Identities of few detections, then what is weak, go on along their causal tracks.
         owned = (owner[piece] > 0) & ~used
         of[owned] = pieces + piece[owned]
@@ -299,7 +283,7 @@ class LagDecider:
         alone = (of < 0) & ~np.isin(rows.causal, known)
         of[alone] = 2 * pieces + np.unique(rows.causal[alone], return_inverse=True)[1].reshape(-1)
         of[rows.owner == 0] = -1
-        return _Choice(of, probability, used, *joined)
+        return _Choice(of, best.probability, used, *best[2:])
 
     def _identities(
         self, tracker: ModelTracker, rows: WindowRows, choice: _Choice, fresh: BoolArray
