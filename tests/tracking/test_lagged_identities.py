@@ -128,7 +128,7 @@ def test_memory_is_bounded_by_what_is_in_view():
         tracker.drain_smoothed()
         lag = tracker._lag
         kept = lag._decider
-        held = [len(lag._whole.last), len(lag._whole.of_causal), len(lag._all_said().t), len(lag._label)]
+        held = [len(lag._whole.last), len(lag._whole.of_causal), len(lag._all_decided().t), len(lag._label)]
         sizes.append([*held, len(kept._steps), len(kept._kept.t), len(kept._named), len(kept._count)])
     early, late = np.array(sizes[300:600]).max(axis=0), np.array(sizes[900:]).max(axis=0)
     assert (late <= early + 2).all(), (early, late)

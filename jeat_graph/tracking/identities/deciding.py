@@ -51,14 +51,14 @@ class SoFar(NamedTuple):
     Attributes:
         decided: (P,) pieces whose beginning is: nothing precedes them.
         past: of those that are in view no more.
-        begun: time of the first look (s).
-        looks: how many there have been.
+        begun: time of the first scan (s).
+        times: how many times of scans there have been.
     """
 
     decided: BoolArray
     past: Past
     begun: float
-    looks: int
+    times: int
 
 
 class Recording(NamedTuple):
@@ -66,7 +66,7 @@ class Recording(NamedTuple):
 
     Attributes:
         measured: the detections.
-        scan_t: (T,) all times at which a sensor looked (s).
+        scan_t: (T,) all times of scans (s).
         scene: what was learnt of the scene.
     """
 
@@ -214,7 +214,7 @@ def _joined(
         free = ~so_far.decided[head]
         tail, head, past = tail[free], head[free], so_far.past
         span = so_far.begun, span[1]
-        step = (span[1] - span[0]) / max(so_far.looks - 1, 1) or step
+        step = (span[1] - span[0]) / max(so_far.times - 1, 1) or step
         pieces = pieces._replace(begins=np.where(so_far.decided, span[0], pieces.begins))
     ratio = _log_ratios(recording, members, tail, head, c)
     links = Links(tail, head, ratio)

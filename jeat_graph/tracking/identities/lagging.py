@@ -21,7 +21,7 @@ from jeat_graph.data.detections import Scan
 from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.identities.passes import Pass
-from jeat_graph.tracking.identities.retracking import lacking
+from jeat_graph.tracking.identities.retracking import lacking, last_before
 from jeat_graph.tracking.identities.windows import DecidedStep, LagDecider, no_links
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ _NOBODY = 1 << 62
 _LAGS_KEPT = 4.0
 
 
-class _Said(NamedTuple):
+class _Decided(NamedTuple):
     """What was decided of detections (N,), in order of time: identity, causal track, probability."""
 
     t: FloatArray
@@ -41,8 +41,8 @@ class _Said(NamedTuple):
     causal: IntArray
     probability: FloatArray
 
-    def take(self, rows: IntArray | BoolArray) -> _Said:
-        return _Said(self.t[rows], self.owner[rows], self.causal[rows], self.probability[rows])
+    def take(self, rows: IntArray | BoolArray) -> _Decided:
+        return _Decided(self.t[rows], self.owner[rows], self.causal[rows], self.probability[rows])
 
 
 class _Whole:
@@ -113,7 +113,7 @@ class LagSmoother:
         self._followed: list[tuple[IntArray, FloatArray]] = []  # identities and times of rows of these
         self._decided_s = -math.inf  # time of the last step that is decided
         self._ready: list[Trajectories] = []  # rows of before time went on from another moment
-        self._said: list[_Said] = []
+        self._decisions: list[_Decided] = []
         self._links: list[IdentityLinks] = []
 
     def note(self, batch: Sequence[Scan], taken: Pass, living: IntArray, tracker: ModelTracker) -> None:
@@ -141,7 +141,7 @@ class LagSmoother:
         self._decider.reset()
         if self._follower is not None:
             self._follower.reset(t)
-        self._whole, self._label, self._said = _Whole(), {}, []
+        self._whole, self._label, self._decisions = _Whole(), {}, []
         self._beside, self._followed, self._decided_s = [], [], -math.inf
 
     def _all_rows(self, tracker: ModelTracker, causal: Trajectories | None = None) -> Trajectories:
@@ -178,7 +178,9 @@ class LagSmoother:
             self._links.append(links)
         for step in steps:
             self._decided_s, count = step.t, len(step.owner)
-            self._said.append(_Said(np.full(count, step.t), step.owner, step.causal, step.probability))
+            self._decisions.append(
+                _Decided(np.full(count, step.t), step.owner, step.causal, step.probability)
+            )
             for owner, causal in zip(step.owner.tolist(), step.causal.tolist(), strict=True):
                 self._whole.note(owner, causal, step.t)
             self._follow(step, tracker)
@@ -231,15 +233,10 @@ class LagSmoother:
 
     def _owned(self, table: Trajectories) -> Trajectories:
         """Return causal rows with the identity of their track's last detection; without those of nobody."""
-        said = self._all_said()
-        order = np.lexsort((said.t, said.causal))
-        owner = np.zeros(len(table), dtype=np.int64)
-        for one in np.unique(table.track_id).tolist():
-            low, high = np.searchsorted(said.causal[order], [one, one + 1]).tolist()
-            own, rows = order[low:high], np.flatnonzero(table.track_id == one)
-            at = np.searchsorted(said.t[own], table.t[rows], side="right") - 1
-            if len(own):
-                owner[rows] = np.where(at >= 0, said.owner[own[np.maximum(at, 0)]], 0)
+        decided = self._all_decided()
+        last = last_before(decided.t, decided.causal, table)
+        owner, known = np.zeros(len(table), dtype=np.int64), last >= 0
+        owner[known] = decided.owner[last[known]]
         return replace(table, track_id=owner).take(owner > 0)
 
     def _left(self, limit: float) -> Trajectories:
@@ -253,26 +250,22 @@ class LagSmoother:
     def _with_causal(self, table: Trajectories) -> Trajectories:
         """Return rows, in order of time, with the causal identity of the last detection, and how sure."""
         table = table.take(np.lexsort((table.track_id, table.t)))
-        said = self._all_said()
-        order = np.lexsort((said.t, said.owner))
-        owners = said.owner[order]
-        causal, probability = table.track_id.copy(), np.ones(len(table))
-        for one in np.unique(table.track_id).tolist():
-            low, high = np.searchsorted(owners, [one, one + 1]).tolist()
-            if high > low:
-                rows = np.flatnonzero(table.track_id == one)
-                own = order[low:high]
-                at = np.searchsorted(said.t[own], table.t[rows], side="right") - 1
-                of = own[np.maximum(at, 0)]
-                causal[rows], probability[rows] = said.causal[of], said.probability[of]
+        decided = self._all_decided()
+        last = last_before(decided.t, decided.owner, table)
+        # Of rows before all that is kept of their identity, the first detection.
+        owners, first = np.unique(decided.owner, return_index=True)
+        early = np.flatnonzero((last < 0) & np.isin(table.track_id, owners))
+        last[early] = first[np.searchsorted(owners, table.track_id[early])]
+        causal, probability, known = table.track_id.copy(), np.ones(len(table)), last >= 0
+        causal[known], probability[known] = decided.causal[last[known]], decided.probability[last[known]]
         return replace(table, causal_id=causal, identity_probability=probability)
 
-    def _all_said(self) -> _Said:
-        if len(self._said) != 1:
+    def _all_decided(self) -> _Decided:
+        if len(self._decisions) != 1:
             none = np.zeros(0, dtype=np.int64)
-            parts = [_Said(np.zeros(0), none, none, np.zeros(0)), *self._said]
-            self._said = [_Said(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))]
-        return self._said[0]
+            parts = [_Decided(np.zeros(0), none, none, np.zeros(0)), *self._decisions]
+            self._decisions = [_Decided(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))]
+        return self._decisions[0]
 
     def _forget(self) -> None:
         """Forget what no row can be of any more."""
@@ -284,11 +277,11 @@ class LagSmoother:
         owners |= {one for table in self._beside for one in table.track_id.tolist()}
         owners |= {self._whole.of_causal[one][0] for one in causal if one in self._whole.of_causal}
         self._whole.forget(causal, owners)
-        said = self._all_said()
-        keep = np.isin(said.owner, list(owners))
-        if self._has_lag and len(said.t):
+        decided = self._all_decided()
+        keep = np.isin(decided.owner, list(owners))
+        if self._has_lag and len(decided.t):
             last = np.zeros(len(keep), dtype=np.bool_)
-            order = np.lexsort((said.t, said.owner))
-            last[order] = np.r_[np.diff(said.owner[order]) != 0, True]
-            keep &= last | (said.t > said.t[-1] - _LAGS_KEPT * self._lag_s)
-        self._said = [said.take(keep)]
+            order = np.lexsort((decided.t, decided.owner))
+            last[order] = np.r_[np.diff(decided.owner[order]) != 0, True]
+            keep &= last | (decided.t > decided.t[-1] - _LAGS_KEPT * self._lag_s)
+        self._decisions = [decided.take(keep)]

@@ -125,14 +125,26 @@ def _last_hits(table: Trajectories, t: FloatArray, of: IntArray) -> IntArray:
     if not len(table):
         return np.zeros(0, dtype=np.int64)
     first = int(np.searchsorted(t, table.t.min() - LONGEST_GAP_S - 1.0))
-    number = len(t) - first
-    both_t, both_of = np.concatenate([t[first:], table.t]), np.concatenate([of[first:], table.track_id])
+    return first + last_before(t[first:], of[first:], table)
+
+
+def last_before(t: FloatArray, of: IntArray, table: Trajectories) -> IntArray:
+    """Return the last detection (R,) of the track of each row up to its time, -1 where there is none.
+
+    Args:
+        t: (K,) times of detections, in order.
+        of: (K,) whose they are.
+        table: rows.
+    """
+    number = len(t)
+    both_t, both_of = np.concatenate([t, table.t]), np.concatenate([of, table.track_id])
     is_row = np.arange(len(both_t)) >= number
     order = np.lexsort((is_row, both_t, both_of))
     at = np.maximum.accumulate(np.where(is_row[order], -1, np.arange(len(order))))
+    found = np.where(at >= 0, order[at], -1)
     last = np.empty(len(order), dtype=np.int64)
-    last[order] = order[at]
-    return np.asarray(first + last[number:], dtype=np.int64)
+    last[order] = np.where((found >= 0) & (both_of[found] == both_of[order]), found, -1)
+    return last[number:]
 
 
 def changed_tracks(decision: IdentityDecision) -> BoolArray:

@@ -2,8 +2,9 @@
 
 Each window holds what is not decided and, of every identity that was decided, its last detections. These
 are one piece that nothing precedes: whatever was joined or cut before stays so, and its forward state goes
-on into the window. What is older than the lag is then decided as the window has it. Windows begin anew in
-shares of the lag, so that every detection is decided with as much future in view as any other.
+on into the window. What is older than the lag is then decided as the window has it. Windows
+follow each other by a share of the lag, so that every detection is decided with as much future in view as
+any other.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ OVERLAP = 0.5
 _KEPT = 30
 # Gaps that the length of the next ones is learnt from.
 _GAPS = 200
-# Identities that begin so soon after the first look had begun before (s, in looks).
+# Identities that begin so soon after the first scan had begun before it (in times of scans).
 _AT_BEGINNING = 2.5
 
 
@@ -116,14 +117,14 @@ class _Choice(NamedTuple):
     Attributes:
         chain: (N,) of each row, -1 for nobody's.
         probability: (N,).
-        told: (N,) whether the row is of a piece that is in the cover.
+        in_cover: (N,) whether the row is of a piece that is.
         tail, head: (K,) rows that it joins, with
         ratio, joined, terms: as `IdentityLinks` has them.
     """
 
     chain: IntArray
     probability: FloatArray
-    told: BoolArray
+    in_cover: BoolArray
     tail: IntArray
     head: IntArray
     ratio: FloatArray
@@ -147,7 +148,7 @@ class LagDecider:
     _named: set[int] = field(default_factory=set)
     _past: Past = field(default_factory=Past.none)
     _number: int = 0
-    _looks: int = 0
+    _times: int = 0  # of scans so far
     _begun: float | None = None
     _next: float = 0.0
     _back: ModelTracker | None = None
@@ -157,7 +158,7 @@ class LagDecider:
         t = float(batch[0].t)
         if self._begun is None:
             self._begun, self._next = t, t + self.lag_s
-        self._looks += 1
+        self._times += 1
         self._steps.append(_Step(t, list(batch), taken, self._number))
         self._number += len(taken.assigned)
 
@@ -165,7 +166,7 @@ class LagDecider:
         """Let time begin again from any moment, when all that came is decided; identities go on."""
         self._steps.clear()
         self._done, self._kept, self._begun = 0, WindowRows.none(), None
-        self._count, self._looks = {}, 0
+        self._count, self._times = {}, 0
 
     def in_view(self) -> tuple[set[int], set[int]]:
         """Return the causal tracks, and the identities, that windows to come may have."""
@@ -226,7 +227,7 @@ class LagDecider:
     def _rows(self, tracker: ModelTracker, back: Pass) -> tuple[WindowRows, IntArray, FloatArray]:
         """Return what is kept and what is undecided, who took it backward, 0 for what is older, how real."""
         new = list(self._steps)[self._done :]
-        looked, parts = tracker.engine_sensors, []
+        sensors, parts = tracker.engine_sensors, []
         for step in new:
             size = [len(scan) for scan in step.batch]
             boxes = np.concatenate([scan.boxes for scan in step.batch])
@@ -235,7 +236,7 @@ class LagDecider:
                 WindowRows(
                     np.arange(step.first, step.first + count),
                     np.full(count, step.t),
-                    np.repeat([looked.index(scan.sensor) for scan in step.batch], size).astype(np.int64),
+                    np.repeat([sensors.index(scan.sensor) for scan in step.batch], size).astype(np.int64),
                     np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1),
                     step.taken.assigned,
                     deciding.log_odds(step.taken.real),
@@ -265,15 +266,15 @@ class LagDecider:
         np.maximum.at(odds, piece, rows.odds)
         count = np.bincount(piece[rows.owner < 0], minlength=pieces)
         count += np.array([self._count.get(one, 0) for one in owner.tolist()], dtype=np.int64)
-        told = (odds > deciding.LEAST_LOG_ODDS) & (count >= deciding.LEAST_DETECTIONS)
+        in_cover = (odds > deciding.LEAST_LOG_ODDS) & (count >= deciding.LEAST_DETECTIONS)
         number = np.full(pieces, -1)
-        number[told] = np.arange(told.sum())
+        number[in_cover] = np.arange(in_cover.sum())
         place = number[piece]
         used = place >= 0
-        looked = np.array([step.t for step in self._steps])
-        so_far = SoFar(owner[told] > 0, self._past, float(self._begun or 0.0), self._looks)
+        scan_t = np.array([step.t for step in self._steps])
+        so_far = SoFar(owner[in_cover] > 0, self._past, float(self._begun or 0.0), self._times)
         votes = np.stack([rows.causal, np.where(back > 0, back, -rows.causal - 1)])
-        best = deciding.best_chains(Recording(seen, looked, scene), place, votes, c, so_far)
+        best = deciding.best_chains(Recording(seen, scan_t, scene), place, votes, c, so_far)
         of = best.chain
         # Identities of few detections, then what is weak, go on along their causal tracks.
         owned = (owner[piece] > 0) & ~used
@@ -301,8 +302,8 @@ class LagDecider:
                 name = max(tracker.num_born, max(self._named, default=0)) + 1
             self._named.add(name)
             identity[chain] = name
-            beginning = _AT_BEGINNING * (rows.t[-1] - (self._begun or 0.0)) / max(self._looks - 1, 1)
-            if choice.told[row] and rows.t[row] > (self._begun or 0.0) + beginning:
+            beginning = _AT_BEGINNING * (rows.t[-1] - (self._begun or 0.0)) / max(self._times - 1, 1)
+            if choice.in_cover[row] and rows.t[row] > (self._begun or 0.0) + beginning:
                 rim = self._at_rim(tracker, rows.boxes[row : row + 1])
                 self._past = self._past._replace(births=self._past.births + np.bincount(rim, minlength=2))
         return identity
@@ -343,8 +344,8 @@ class LagDecider:
             step = self._steps[self._done]
             low, high = np.searchsorted(rows.number, [step.first, step.first + len(step.taken.assigned)])
             own = slice(int(low), int(high))
-            said = rows.owner[own], rows.causal[own], choice.probability[own], later[own]
-            decided.append(DecidedStep(step.t, step.batch, *said))
+            decision = rows.owner[own], rows.causal[own], choice.probability[own], later[own]
+            decided.append(DecidedStep(step.t, step.batch, *decision))
             self._done += 1
         last = decided[-1].t if decided else -np.inf
         while self._done and self._steps[0].t < last - OVERLAP * self.lag_s:
@@ -371,8 +372,8 @@ class LagDecider:
         keep = order[(rank < _KEPT) & alive[np.cumsum(begins) - 1]]
         ended = order[starts[~alive]]
         gone = set(rows.owner[ended].tolist())
-        told = np.array([self._count.get(one, 0) for one in rows.owner[ended].tolist()], dtype=np.int64)
-        rim = self._at_rim(tracker, rows.boxes[ended[told >= deciding.LEAST_DETECTIONS]])
+        counts = np.array([self._count.get(one, 0) for one in rows.owner[ended].tolist()], dtype=np.int64)
+        rim = self._at_rim(tracker, rows.boxes[ended[counts >= deciding.LEAST_DETECTIONS]])
         self._past = self._past._replace(leaving=self._past.leaving + np.bincount(rim, minlength=2))
         self._count = {one: count for one, count in self._count.items() if one and one not in gone}
         self._kept = rows._replace(odds=odds).take(np.sort(keep))
