@@ -27,6 +27,12 @@ def common_time(t: FloatArray, clock: ClockConfig) -> FloatArray:
     return np.asarray(t - clock.offset_s - clock.drift_ppm * _PPM * (t - clock.at_s))
 
 
+def own_time(t: FloatArray, clock: ClockConfig) -> FloatArray:
+    """Return common times (N,) on a sensor's clock (s): the inverse of `common_time`."""
+    drift = clock.drift_ppm * _PPM
+    return np.asarray((t + clock.offset_s - drift * clock.at_s) / (1.0 - drift))
+
+
 class Way(NamedTuple):
     """What brings the scans of one sensor to the others.
 

@@ -108,7 +108,8 @@ def labels_of(
         detections: that they were made of, in the same picture and on the same clock.
         believed: score by sensor from which on a detection is more likely real than not.
     """
-    frames = spread_times(np.unique(detections.scan_t))
+    times = np.unique(detections.scan_t)
+    frames = times[spread(times, APART_S)]
     rows = np.isin(tracks.t, frames) & (tracks.existence >= ABSENT)
     masked = masked_rows(tracks)[rows]
     chosen = tracks.take(rows)
@@ -124,13 +125,13 @@ def labels_of(
     return TrackLabels(truth, np.concatenate([chosen.existence, np.zeros(len(t))]))
 
 
-def spread_times(times: FloatArray, apart_s: float = APART_S) -> FloatArray:
-    """Return times (K,) of those given, ascending, each at least `apart_s` after the one before."""
-    kept: list[float] = []
-    for t in times.tolist():
-        if not kept or t - kept[-1] >= apart_s:
-            kept.append(t)
-    return np.array(kept)
+def spread(times: FloatArray, apart_s: float) -> list[int]:
+    """Return which times (N,), ascending, to take so that each is at least `apart_s` after the one before."""
+    kept: list[int] = []
+    for k, t in enumerate(times.tolist()):
+        if not kept or t - times[kept[-1]] >= apart_s:
+            kept.append(k)
+    return kept
 
 
 def masked_rows(tracks: Trajectories) -> BoolArray:

@@ -7,24 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.rig.common_picture import Way
+from jeat_graph.rig.common_picture import Way, own_time
 from jeat_graph_sehn.teaching.labels import TrackLabels
 
-_PPM = 1e-6
 #: Share of a box that must lie in the picture for it to be asked for.
 LEAST_IN_VIEW = 0.6
 #: Ids of the four masks around what other sensors see; -1 is that of labels elsewhere.
 _BARS = -(10**9)
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-
-
-def own_time(t: FloatArray, clock: ClockConfig) -> FloatArray:
-    """Return common times (N,) as a sensor's clock has them (s): the inverse of `common_time`."""
-    drift = clock.drift_ppm * _PPM
-    return np.asarray((t + clock.offset_s - drift * clock.at_s) / (1.0 - drift))
 
 
 def in_own_picture(labels: TrackLabels, way: Way | None, size_px: tuple[int, int]) -> TrackLabels:

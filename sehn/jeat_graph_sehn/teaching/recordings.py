@@ -18,6 +18,7 @@ from jeat_graph.io.events.opening import open_events
 from jeat_graph.io.files.atomic import atomic_path
 from jeat_graph.io.media.picture_file import read_picture
 from jeat_graph.io.media.video import RgbImage, open_frames
+from jeat_graph_sehn.teaching.labels import spread
 
 _US = 1e6
 
@@ -100,12 +101,9 @@ def later_of(recording: EventRecording, scan_t: FloatArray, given_s: float | Non
 def chosen_frames(times: FloatArray, span: tuple[float, float], most: int, apart_s: float) -> list[int]:
     """Return the numbers of frames in a span of time (s): at most so many, evenly, and this far apart (s)."""
     inside = np.flatnonzero((times >= span[0]) & (times <= span[1]))
-    kept: list[int] = []
-    for k in inside.tolist():
-        if not kept or times[k] - times[kept[-1]] >= apart_s - 1e-6:
-            kept.append(k)
+    kept = inside[spread(times[inside], apart_s - 1e-6)]
     places = np.unique(np.linspace(0, len(kept) - 1, min(most, len(kept))).round().astype(int))
-    return [kept[k] for k in places.tolist()]
+    return [int(kept[k]) for k in places]
 
 
 @dataclass(frozen=True)

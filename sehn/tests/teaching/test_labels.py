@@ -9,11 +9,12 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph_sehn.teaching.drawn_truth import DrawnTruth, WeighedTruth, chances
 from jeat_graph_sehn.teaching.labels import (
+    APART_S,
     TrackLabels,
     hidden,
     labels_of,
     masked_rows,
-    spread_times,
+    spread,
     unexplained,
     vague,
 )
@@ -121,7 +122,8 @@ def test_other_labels_have_another_digest():
 
 
 def test_labels_stand_at_times_that_are_apart():
-    assert spread_times(np.array([0.0, 0.01, 0.05, 0.06, 0.2])).tolist() == [0.0, 0.05, 0.2]
+    times = np.array([0.0, 0.01, 0.05, 0.06, 0.2])
+    assert times[spread(times, APART_S)].tolist() == [0.0, 0.05, 0.2]
 
 
 def weighed(weight):

@@ -8,9 +8,9 @@ import pytest
 from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.picture_map import PictureMap
 from jeat_graph.data.trajectories import GroundTruth
-from jeat_graph.rig.common_picture import Way, common_time
+from jeat_graph.rig.common_picture import Way, common_time, own_time
 from jeat_graph_sehn.teaching.labels import TrackLabels
-from jeat_graph_sehn.teaching.own_picture import beyond_views, in_own_picture, masking_bars, own_time
+from jeat_graph_sehn.teaching.own_picture import beyond_views, in_own_picture, masking_bars
 
 #: From a picture of 640 x 480 px to a common one of 1280 x 960, moved by 100 px to the right.
 SCALED = PictureMap(np.array([[2.0, 0.0, 100.0, 0.0], [0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]))
