@@ -13,7 +13,7 @@ from jeat_graph.cli.terminal import say
 from jeat_graph.data.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
-    from jeat_graph.calibration.procedure import Calibration
+    from jeat_graph.calibration.procedure import Calibration, MeasuredSetting
     from jeat_graph.config.schema import Config
     from jeat_graph.data.detections import Detections
     from jeat_graph.data.tables.reading import ReadingOptions
@@ -264,21 +264,16 @@ def summary(config: Config, found: Calibration) -> list[Table]:
         }
         one = scores.get(name)
         if one is not None:
-            row["even score"] = one.value
-            row["accuracy without (%)"], row["with (%)"] = one.before, one.after
-            row["kept"] = "yes" if one.kept else "no"
+            row |= _judged("even score", one)
         rows.append(row)
     tables = [Table.from_records(rows, title="Sensors", digits={"even score": 3})]
     if found.lasting_errors:
-        errors: list[dict[str, Cell]] = [
-            {
-                "sensor": one.sensor,
-                "lasting error": one.value,
-                "accuracy without (%)": one.before,
-                "with (%)": one.after,
-                "kept": "yes" if one.kept else "no",
-            }
-            for one in found.lasting_errors
-        ]
-        tables.append(Table.from_records(errors, title="Lasting errors", digits={"lasting error": 3}))
+        rows = [{"sensor": one.sensor, **_judged("lasting error", one)} for one in found.lasting_errors]
+        tables.append(Table.from_records(rows, title="Lasting errors", digits={"lasting error": 3}))
     return tables
+
+
+def _judged(name: str, one: MeasuredSetting) -> dict[str, Cell]:
+    """Return the cells of a measured setting."""
+    kept = "yes" if one.kept else "no"
+    return {name: one.value, "accuracy without (%)": one.before, "with (%)": one.after, "kept": kept}
