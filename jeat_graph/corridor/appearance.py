@@ -52,7 +52,7 @@ class AppearanceModel(NamedTuple):
 
 
 def learn_appearance(cosine: FloatArray, probability: FloatArray) -> AppearanceModel | None:
-    """Learn how alike vehicles look.
+    """Learn the similarity of one vehicle's appearances, and of two vehicles'.
 
     Args:
         cosine: (E,) of each pair, NaN where one has no embedding.

@@ -64,7 +64,7 @@ class GapParameters:
         rate: β (1/s).
         lanes: p(lane_j | lane_i) over p(lane_j).
         kinds: p(class_j | class_i) over p(class_j).
-        appearance: how alike vehicles look; None where that is not known, or tells nothing.
+        appearance: densities of the similarity of appearance; None where none are known, or none help.
     """
 
     offset_s: float

@@ -52,7 +52,8 @@ class Rewinding:
     """Puts scans where they belong in the order of time, by taking the steps behind them again.
 
     Args:
-        tracker: the tracker, new or loaded; it must log takers (`logs_assigned`) when scans are inserted.
+        tracker: the tracker, new or loaded; it must log which track each detection went to (`logs_assigned`)
+            when scans are inserted.
 
     Attributes:
         steps: the steps that may still be taken again, by time.

@@ -34,7 +34,7 @@ def retrack(
     Causal tracks that no decision changes are tracked as they were: their rows are those that they have
     without one. The others follow what was decided; a track of no identity that begins beside has no rows.
     Where such an identity has no row, but its detections' causal track has, it has that, in the last piece:
-    what was cut off from a track begins anew, with nothing to say for it, and would be believed later.
+    what was cut off from a track starts without its evidence, so that its existence would rise later.
 
     Args:
         detections: all scans, with boxes in the common picture.

@@ -1,6 +1,6 @@
 """What of a recording is learned from, what is held back to judge by, and whether there is enough of both.
 
-Neighbouring moments are almost the same picture, and a vehicle looks alike all the way. So the held-back part
+Neighbouring frames are almost the same picture, and a vehicle keeps its appearance. So the held-back part
 is the last one, a gap lies before it, and vehicles that are in both parts are not asked for in the second.
 """
 

@@ -277,7 +277,7 @@ def _pictures(
 
 
 def _described(path: Path) -> dict[str, str]:
-    """Return what a data set is: its name, and the checksum of what it says of itself."""
+    """Return what identifies a data set: its name, and the checksum of its manifest."""
     manifest = path / "manifest.json"
     return {"name": path.name, **({"sha256": sha256_of(manifest)} if manifest.is_file() else {})}
 

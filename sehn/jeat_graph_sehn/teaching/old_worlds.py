@@ -1,4 +1,4 @@
-"""A little of what a network has learned from before, rendered anew, so that it is not forgotten."""
+"""Rehearsal against forgetting: a few newly rendered scenes of the kind that a network was trained on."""
 
 from __future__ import annotations
 
