@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jeat_graph import Tracker, load_config
+from jeat_graph import Scan, Tracker, load_config
 from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.io.files.packing import pack, unpack
@@ -101,6 +101,17 @@ def test_a_tracker_that_is_loaded_goes_on_with_the_same_bytes(smoother, cut, tmp
     found += answers(second, scans[cut:], drains)
     assert found == expected
     assert bytes_of(second.finish()) == bytes_of(whole.finish())
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_times_below_0_are_no_damage_though_two_sensors_have_not_been_compared_yet(both, tmp_path):
+    """What has not been yet has the time 0: it lies ahead of such a tracker."""
+    tracker = tracker_with("none")
+    scans = [Scan(-50.0 + 0.05 * k, "rgb", [[100.0 + 2 * k, 80, 60, 40]], [0.9]) for k in range(20)]
+    for scan in scans:
+        tracker.step([scan, Scan(scan.t, "evt", scan.boxes if both else [], scan.scores if both else [])])
+    tracker.save(tmp_path / "state.npz")
+    assert bytes_of(Tracker.load(tmp_path / "state.npz").causal()) == bytes_of(tracker.causal())
 
 
 @settings(max_examples=30)

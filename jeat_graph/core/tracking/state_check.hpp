@@ -124,11 +124,15 @@ inline void check_tracks(const Tracks& tracks, const State& state) {
     }
     check_counts("tracks.recent_hits", tracks.recent_hits);
     check_counts("tracks.recent_misses", tracks.recent_misses);
-    for (const double time : tracks.last_box_s) check_past("tracks.last_box_s", time, state.t);
+    // Times of what has not been yet are 0, which may lie ahead of a time below 0.
+    for (std::size_t k = 0; k < tracks.last_box_s.size(); ++k)
+        if (tracks.last_box[k].right > tracks.last_box[k].left || tracks.last_box_s[k] != 0.0)
+            check_past("tracks.last_box_s", tracks.last_box_s[k], state.t);
     for (const Sides& box : tracks.last_box)
         require(box.right >= box.left && box.bottom >= box.top, "tracks.last_box", "is inside out");
-    for (const double time : tracks.apart_s) check_past("tracks.apart_s", time, state.t);
     check_flags("tracks.has_apart", tracks.has_apart);
+    for (std::size_t k = 0; k < tracks.apart_s.size(); ++k)
+        if (tracks.has_apart[k] || tracks.apart_s[k] != 0.0) check_past("tracks.apart_s", tracks.apart_s[k], state.t);
     check_between("tracks.apart", tracks.apart, -kMostLogSize, kMostLogSize);
     check_flags("tracks.has_innovation", tracks.has_innovation);
     check_between("tracks.innovation", tracks.innovation, -kMostLogVariance, kMostLogVariance);
