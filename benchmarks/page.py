@@ -56,7 +56,8 @@ _TITLES = {
 _HOW = """Scores are those of `jeat-graph eval`, pooled over the recordings of a set: MOTA and MOTP
 (CLEAR), HOTA, DetA and AssA, IDF1, in per cent, at the frames of the truth. The challenges' servers
 differ in details: they count tracks on some ignored classes as false, and KITTI's leaves out small and
-occluded objects. *Causal* rows use past data only, *smoothed* rows also one to two seconds of later data.
+occluded objects. *Causal* rows use past data only, *smoothed* rows later data, too, and the whole
+recording for who is who (`smoother.identities=auto`, as `track` does).
 ANEES is the normalised estimation error squared of the position, averaged, per degree of freedom: 1 if
 the variances are right. The next column is the share of errors inside the 95 % ellipses.
 

@@ -45,7 +45,8 @@ def track(
             `first_frame` where it counts frames, `time_unit`, `video`, `class_names`, `score_scale` …
 
     Returns:
-        The causal table, and the smoothed one unless the configuration asks for no smoother.
+        The causal table, and the smoothed one unless the configuration asks for no smoother. Its identities
+        are decided with the whole recording in view, unless `smoother.identities` says another way.
 
     Raises:
         JeatGraphError: what the detections, the file or the configuration have wrong.
@@ -55,6 +56,7 @@ def track(
     from jeat_graph.runs.declaring import fit_input
     from jeat_graph.runs.input_checks import check_units
     from jeat_graph.runs.latency import at_measurement
+    from jeat_graph.runs.offline_identities import with_identities
     from jeat_graph.tracking.tracker import Tracker
 
     recording = recording_of(detections, {**options, "image": image})
@@ -64,10 +66,11 @@ def track(
     for line in messages:
         warnings.warn(line, InputWarning, stacklevel=2)
     check_units(recording, settings, "the detections")  # before rates are taken for what they seem
-    tracker = Tracker(fit_input(settings, recording)[0])
+    settings = fit_input(settings, recording)[0]
     if classes is not None:  # the picture is as large as the boxes of all classes reach
         recording = recording.of_class(*as_names(classes))
-    recording = at_measurement(recording, tracker.config)
+    recording = at_measurement(recording, settings)
+    tracker = Tracker(with_identities(settings, len(recording))[0])
     causal = Trajectories.concatenate(list(tracker.run(recording)) or [Trajectories.empty()])
     wanted = tracker.config.smoother.engine != "none"
     return Tracks(causal, tracker.finish() if wanted else None)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from jeat_graph.config.fields import Section, choice, number
 from jeat_graph.data.errors import InputWarning
 
-IDENTITIES = ("causal", "lag", "whole")
+IDENTITIES = ("auto", "causal", "lag", "whole")
 ENGINES = ("fixed-lag", "full", "gtsam", "gtsam-full", "none")
 #: Names that engines had.
 FORMER = {"fixed-lag-rts": "fixed-lag", "rts": "full"}
@@ -31,11 +31,12 @@ class SmootherConfig(Section):
         1.0, "s", "fixed lag: a state is final once this much time has followed", open_low=True
     )
     identities: str = choice(
-        "causal",
+        "auto",
         IDENTITIES,
         "who is who in the smoothed table. causal: as the causal table says; lag: decided once more with "
         "`lag_s` of the future in view, and never changed again; whole: decided at the end with the whole "
-        "recording in view, which is kept in memory; not for streams",
+        "recording in view, which is kept in memory; not for streams; auto: whole where a recording is "
+        "tracked from beginning to end (`track`, `batch`, Python's `track`), else causal",
     )
     road: str = choice(
         "spline",

@@ -153,3 +153,15 @@ def progress_span(begin: float, end: float) -> Iterator[None]:
     finally:
         span.enter()
     span.tell(mine.end)
+
+
+def pieces_in_span(begin: float, end: float, pieces: Iterable[T]) -> Iterator[T]:
+    """Pass on what is made while it is asked for; making it is a part of the present piece (`progress_span`).
+
+    Args:
+        begin: share of the piece that is done before.
+        end: share that is done after it.
+        pieces: that are made when they are asked for.
+    """
+    with progress_span(begin, end):
+        yield from pieces

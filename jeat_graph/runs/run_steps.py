@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import time
 import warnings
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, InputWarning
 from jeat_graph.data.json_numbers import nan_as_null
-from jeat_graph.data.progress import refreshing
+from jeat_graph.data.progress import progress_to, refreshing
 from jeat_graph.io.files.piecewise import PiecewiseWriter
 from jeat_graph.io.formats.csv_table import FORMAT as CSV
 from jeat_graph.io.formats.registry import written_formats
@@ -92,36 +93,29 @@ class RunSteps:
 
     def take_all(self) -> FloatArray:
         """Take the steps, and write the tables; return the times of all steps (I,), in s."""
-        from tqdm import tqdm
-
         step_s = np.zeros(len(self._instants))
-        hidden = not self._options.progress
         begin = time.perf_counter()
-        with (
-            _Files(self._run, self._config, self._options, self._named) as self._files,
-            tqdm(total=len(self._instants), desc="track", unit="step", disable=hidden, leave=False) as bar,
-            refreshing(bar),
-        ):
+        with _Files(self._run, self._config, self._options, self._named) as self._files:
             if self._unfinished is not None:
                 self._unfinished.begin()
                 for name, piece in self._unfinished.rows():
                     self._files.append(name, piece)
-            bar.update(self._done)
-            for k, batch in enumerate(self._detections.batches()):
-                if k < self._done:
-                    continue
-                start = time.perf_counter()
-                table = self._tracker.step(batch)
-                step_s[k] = time.perf_counter() - start
-                self._reported.update(table.track_id.tolist())
-                self._write("causal", table)
-                self._rows["below_least"] += self._tracker.rows_below_least()
-                self._after_step(k)
-                bar.update()
-            bar.refresh()
+            with self._bar("track", len(self._instants), "step") as bar:
+                bar.update(self._done)
+                for k, batch in enumerate(self._detections.batches()):
+                    if k < self._done:
+                        continue
+                    start = time.perf_counter()
+                    table = self._tracker.step(batch)
+                    step_s[k] = time.perf_counter() - start
+                    self._reported.update(table.track_id.tolist())
+                    self._write("causal", table)
+                    self._rows["below_least"] += self._tracker.rows_below_least()
+                    self._after_step(k)
+                    bar.update()
+                bar.refresh()
             if self._smooths:
-                for piece in self._tracker.finish_in_pieces():
-                    self._write("smoothed", piece)
+                self._finish()
             if self._kept is not None:
                 self._write("measured", self._kept.release())
         links = self._tracker.identity_links()
@@ -134,6 +128,28 @@ class RunSteps:
         taken = step_s[self._done :]
         self._sum_up(taken if len(taken) else np.zeros(1), time.perf_counter() - begin)
         return self._instants
+
+    def _finish(self) -> None:
+        """Write what is left of the smoothed table; where the whole recording decides, that is all of it."""
+        with ExitStack() as shown:
+            if self._tracker.keeps_recording:
+                form = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}]"
+                bar = shown.enter_context(self._bar("identities", 1, "", form))
+                shown.enter_context(progress_to(lambda share: bar.update(share - bar.n)))
+            for piece in self._tracker.finish_in_pieces():
+                self._write("smoothed", piece)
+
+    @contextmanager
+    def _bar(self, name: str, total: int, unit: str, form: str | None = None) -> Iterator[Any]:
+        """Show a progress bar, whose clock goes on by itself."""
+        from tqdm import tqdm
+
+        hidden = not self._options.progress
+        with (
+            tqdm(total=total, desc=name, unit=unit, bar_format=form, disable=hidden, leave=False) as bar,
+            refreshing(bar),
+        ):
+            yield bar
 
     def _after_step(self, k: int) -> None:
         """Write what else step `k` gave, and now and then what has become final, and the state."""

@@ -15,6 +15,7 @@ from jeat_graph.io.formats.csv_table import FORMAT as CSV
 from jeat_graph.io.formats.registry import written_formats
 from jeat_graph.io.tables.scans_io import SCANS, write_scans
 from jeat_graph.runs.directory import RUN_JSON, RunDirectory
+from jeat_graph.runs.offline_identities import with_identities
 from jeat_graph.runs.run_options import RunOptions, RunRecord
 from jeat_graph.runs.run_steps import RunSteps
 from jeat_graph.tracking.input_watch import outside_counted
@@ -26,8 +27,8 @@ def write_run(
 ) -> None:
     """Track a recording and write the files of the run, `run.json` last.
 
-    Both tables are written while they are made: memory does not grow with their length (but for the engines
-    that smooth whole tracks).
+    Both tables are written while they are made: memory does not grow with their length, but for the engines
+    that smooth whole tracks; and identities that the whole recording decides keep its detections.
 
     Args:
         detections: the recording, checked (`input_checks.check_detections`).
@@ -40,8 +41,12 @@ def write_run(
         DataError: a time that a format cannot express.
         OtherRunError: what was broken off in the folder is another run.
     """
+    used, why = with_identities(config, len(detections))
     with outside_counted():  # by `input_checks`
-        instants = RunSteps(detections, config, run, record, options).take_all()
+        instants = RunSteps(detections, used, run, record, options).take_all()
+    if record.smoother is not None:
+        record.smoother["identities"] = used.smoother.identities
+        record.smoother |= {"identities_why": why} if why else {}
     write_scans(detections, run.path(SCANS))
     rate_hz = _frame_rate(detections, config, options)
     _write_at_frames(run, "causal", instants, rate_hz, options.formats)

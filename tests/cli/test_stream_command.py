@@ -83,7 +83,8 @@ def detections(recording):
 @pytest.fixture(scope="module")
 def tracked(recording, tmp_path_factory):
     out = tmp_path_factory.mktemp("tracked")
-    assert main(["track", str(recording / "detections.csv"), *IMAGE, "--out", str(out)]) == 0
+    identities = ["--set", "smoother.identities=causal"]  # those of a stream
+    assert main(["track", str(recording / "detections.csv"), *IMAGE, *identities, "--out", str(out)]) == 0
     return out
 
 

@@ -240,6 +240,7 @@ def test_a_new_run_replaces_all_files_of_the_old_one_and_no_others(write, tmp_pa
     main(["track", file, "--out", str(out)])
     assert sorted(path.name for path in out.iterdir() if path.name != "smoothed.csv") == [
         "causal.csv",
+        "links.csv",
         "notes.txt",
         "run.json",
         "scans.csv",

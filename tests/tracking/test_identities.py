@@ -306,23 +306,23 @@ def test_weak_detections_go_with_their_causal_track_where_its_chain_is_free():
     assert with_weak(seen, causal, piece, np.array([-1, 4, -1, -1, 4, -1])).tolist() == [4, 4, -1, -1, 4, 4]
 
 
-def test_track_decides_if_asked_and_says_what_it_joined(tmp_path):
+def test_track_decides_unless_told_otherwise_and_says_what_it_joined(tmp_path):
     rows = ["t,sensor,left,top,width,height,score"]
     for scan in hidden():
         box = ",".join(f"{x:.3f}" for x in scan.boxes[0]) if len(scan) else ",,,"
         rows.append(f"{scan.t},rgb,{box},{'.9' if len(scan) else ''}")
     (tmp_path / "d.csv").write_text("\n".join(rows) + "\n")
     command = ["track", str(tmp_path / "d.csv"), "--image", "3840x2160", "--out"]
-    main([*command, str(tmp_path / "run"), "--set", "smoother.identities=whole"])
+    main([*command, str(tmp_path / "run")])
     smoothed = read_run(tmp_path / "run").smoothed
     assert set(smoothed.track_id.tolist()) == {1}
     assert set(smoothed.causal_id.tolist()) == {1, 2}
     header, *links = (tmp_path / "run" / "links.csv").read_text().splitlines()
     assert header.startswith("from,to,gap,log_ratio,probability")
     assert any(line.startswith("1,2,2.6") for line in links)
-    found = track(tmp_path / "d.csv", load_config("default", WHOLE)).smoothed
+    found = track(tmp_path / "d.csv", load_config("default", SIZE)).smoothed
     assert np.array_equal(found.track_id, smoothed.track_id)
-    main([*command, str(tmp_path / "causal")])
+    main([*command, str(tmp_path / "causal"), "--set", "smoother.identities=causal"])
     whole, causally = ((tmp_path / name / "causal.csv").read_bytes() for name in ("run", "causal"))
     assert whole == causally
     assert not (tmp_path / "causal" / "links.csv").exists()
@@ -334,7 +334,7 @@ def test_track_decides_if_asked_and_says_what_it_joined(tmp_path):
 def test_the_paper_and_streams_refuse_what_they_cannot():
     with pytest.raises(ConfigError, match="another engine"):
         load_config("paper", ["smoother.identities=whole"])
-    with pytest.raises(ConfigError, match="causal, lag, whole"):
+    with pytest.raises(ConfigError, match="auto, causal, lag, whole"):
         load_config("default", ["smoother.identities=all"])
     with pytest.raises(ConfigError, match="in order of time"):
         LiveTracker(Tracker(load_config("default", WHOLE)))

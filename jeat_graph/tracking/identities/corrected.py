@@ -12,6 +12,7 @@ import numpy as np
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.corrected_tracks import CorrectedTracks, Disagreements
 from jeat_graph.data.detections import Detections
+from jeat_graph.data.progress import pieces_in_span, progress_span
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.engine import lacking
 from jeat_graph.tracking.identities.deciding import IdentityDecision
@@ -46,13 +47,14 @@ def along_corrected(
     """
     detections, causal = log.recording()
     names, code, owner = match(detections, rows)
-    first = Trajectories.concatenate(list(_along(detections, owner, causal.assigned, _at_scans(tracker))))
+    with progress_span(0.0, 0.5):
+        first = Trajectories.concatenate(list(_along(detections, owner, causal.assigned, _at_scans(tracker))))
     found = compare(rows, code, first, detections, owner, _noise(tracker))
     assigned = causal.assigned
     if len(found.moved) or len(found.added):
         detections, owner, origin = edited(detections, owner, rows, code, found)
         assigned = np.where(origin >= 0, np.append(assigned, 0)[origin], 0)
-    smoothed = _along(detections, owner, assigned, tracker)
+    smoothed = pieces_in_span(0.5, 1.0, _along(detections, owner, assigned, tracker))
     return found.disagreements, (replace(one, track_id=names[one.track_id - 1]) for one in smoothed)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.progress import with_progress
 from jeat_graph.filters.model_constants import ModelConstants
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def one_pass(
     """
     tracker = like.fresh_copy(smooths=False, constants=constants)
     assigned, real = np.zeros(len(detections), dtype=np.int64), np.zeros(len(detections))
-    for rows, batch in steps(detections, backward=backward):
+    for rows, batch in with_progress(steps(detections, backward=backward), len(np.unique(detections.scan_t))):
         tracker.take_in(batch)
         assigned[rows], real[rows] = took(tracker, rows.stop - rows.start)
     return Pass(assigned, real)

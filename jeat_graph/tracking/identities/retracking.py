@@ -10,6 +10,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.identities.deciding import LONGEST_GAP_S, IdentityDecision
 from jeat_graph.tracking.identities.passes import steps
@@ -52,7 +53,8 @@ def retrack(
         given = np.stack([np.where(owner > 0, owner, -1), _more_to_come(owner, t), later], axis=1)
         forced = _Along(like, above, np.where(changed, owner, 0), given)
     both, table = [one for one in (causal, forced) if one is not None], _Table(t, decision, changed)
-    for number, (rows, batch) in enumerate(steps(detections)):
+    taken = with_progress(steps(detections), len(np.unique(detections.scan_t)))
+    for number, (rows, batch) in enumerate(taken):
         for one in both:
             one.take(rows, batch)
         if number % STEPS_PER_PIECE == STEPS_PER_PIECE - 1:

@@ -10,6 +10,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.identity_links import IdentityLinks
+from jeat_graph.data.progress import pieces_in_span, progress_span
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.filters import box_sides, sensor_offsets
 from jeat_graph.smoothers.joining import LearntScene, MeasuredBoxes
@@ -23,6 +24,9 @@ from jeat_graph.tracking.one_model import OneModel
 if TYPE_CHECKING:
     from jeat_graph.tracking.model_tracker import ModelTracker
 
+# When the pass backward, and the decision, are done: shares of the time that all takes, for progress.
+_BACKWARD, _DECIDED = 0.25, 0.5
+
 
 def decided(tracker: ModelTracker, log: IdentityLog) -> tuple[IdentityLinks, Iterator[Trajectories]]:
     """Decide who is who in what a tracker was given, and smooth along that.
@@ -35,11 +39,12 @@ def decided(tracker: ModelTracker, log: IdentityLog) -> tuple[IdentityLinks, Ite
         What was joined, and the smoothed rows as they become final.
     """
     detections, causal = log.recording()
-    backward = one_pass(detections, tracker, tracker.constants, backward=True)
+    with progress_span(0.0, _BACKWARD):
+        backward = one_pass(detections, tracker, tracker.constants, backward=True)
     recording = _recording(tracker, detections)
     decision = decide(recording, [causal, backward], backward, tracker.constants)
     rows = retrack(detections, decision, backward.real, tracker)
-    return _links(decision, recording.measured.t), rows
+    return _links(decision, recording.measured.t), pieces_in_span(_DECIDED, 1.0, rows)
 
 
 def _links(decision: IdentityDecision, t: FloatArray) -> IdentityLinks:
