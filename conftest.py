@@ -27,7 +27,8 @@ if "JEAT_GRAPH_NETWORKS" not in os.environ:
 # Examples follow from the test and from the constants in the modules that are loaded, not from a clock:
 # what a test counts over its examples still differs a little with what ran before it, and its bound must
 # allow for that.
-settings.register_profile("jeat-graph", deadline=None, derandomize=True)
+_FULL = os.environ.get("JEAT_GRAPH_FULL", "") not in ("", "0")
+settings.register_profile("jeat-graph", deadline=None, derandomize=True, max_examples=200 if _FULL else 25)
 settings.load_profile("jeat-graph")
 
 # What is imported and collected stays to the end: the collector need not look through half a million objects
@@ -45,7 +46,7 @@ def pytest_collection_finish() -> None:
 @pytest.fixture(scope="session")
 def full() -> bool:
     """Whether the long form of the tests is asked for."""
-    return os.environ.get("JEAT_GRAPH_FULL", "") not in ("", "0")
+    return _FULL
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph import Tracker
@@ -26,7 +26,6 @@ def drawn_boxes(rng, count, spread):
     return np.concatenate([corner, corner + size], axis=1)
 
 
-@settings(max_examples=50)
 @given(seed=st.integers(0, 10**6), count=st.integers(0, 60), spread=st.sampled_from([0.0, 3.0, 30.0, 300.0]))
 def test_the_core_keeps_the_boxes_that_the_definition_keeps(seed, count, spread):
     rng = np.random.default_rng(seed)
@@ -53,7 +52,6 @@ def greedy(gain):
     return sorted(made)
 
 
-@settings(max_examples=50)
 @given(seed=st.integers(0, 10**6), n=st.integers(1, 9), m=st.integers(1, 9), share=st.floats(0.1, 1.0))
 def test_a_group_beyond_the_bound_is_assigned_by_the_greatest_gain_and_others_exactly(seed, n, m, share):
     rng = np.random.default_rng(seed)

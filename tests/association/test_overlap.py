@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.association.overlap import pairwise_covered, pairwise_iou
@@ -28,7 +28,6 @@ def area(box):
     return Fraction(box[2]) * Fraction(box[3])
 
 
-@settings(max_examples=100, deadline=None)
 @given(a=boxes, b=boxes)
 def test_every_pair_is_as_exact_fractions_say(a, b):
     iou, covered = pairwise_iou(a, b), pairwise_covered(a, b)

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.association.path_cover import (
@@ -39,7 +39,6 @@ def drawn_links(seed, nodes=5, number=7):
     return Links(tail, head, rng.normal(scale=2.0, size=number))
 
 
-@settings(max_examples=40, deadline=None)
 @given(st.integers(0, 10_000))
 def test_the_best_cover_is_the_best_of_all(seed):
     links = drawn_links(seed)

@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.config.fields import LARGEST, SMALLEST, check
@@ -236,7 +236,6 @@ def test_every_field_has_a_meaning_and_every_number_a_unit_and_bounds():
 
 
 @given(rate=st.floats(), low=st.floats(), high=st.floats())
-@settings(max_examples=200, deadline=None)
 def test_a_section_is_accepted_exactly_if_each_value_is_within_its_bounds(rate, low, high):
     good = 0.0 <= rate <= 1.0 and SMALLEST <= low <= high <= LARGEST and not 0.0 < rate < SMALLEST
     try:

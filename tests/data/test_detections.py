@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.boxes import check_boxes
@@ -54,7 +54,6 @@ def scans_of(detections):
 
 
 @given(rows=recordings())
-@settings(max_examples=150, deadline=None)
 def test_rows_in_any_order_become_the_scans_they_mean(rows):
     detections = from_rows(rows)
     expected = as_sets(rows)
@@ -66,7 +65,6 @@ def test_rows_in_any_order_become_the_scans_they_mean(rows):
 
 
 @given(rows=recordings())
-@settings(max_examples=100, deadline=None)
 def test_to_rows_and_back_changes_nothing(rows):
     detections = from_rows(rows)
     t, sensor, boxes, scores, empty, _ = detections.to_rows()
@@ -77,7 +75,6 @@ def test_to_rows_and_back_changes_nothing(rows):
 
 
 @given(rows=recordings())
-@settings(max_examples=100, deadline=None)
 def test_a_batch_is_all_the_scans_of_one_time(rows):
     detections = from_rows(rows)
     batches = list(detections.batches())
@@ -90,7 +87,6 @@ def test_a_batch_is_all_the_scans_of_one_time(rows):
 
 
 @given(rows=recordings())
-@settings(max_examples=100, deadline=None)
 def test_the_sensors_taken_apart_and_put_together_are_the_whole(rows):
     detections = from_rows(rows)
     parts = [detections.select(names) for names in ([], *detections.sensors)]
@@ -100,7 +96,6 @@ def test_the_sensors_taken_apart_and_put_together_are_the_whole(rows):
 
 
 @given(rows=recordings())
-@settings(max_examples=50, deadline=None)
 def test_scans_in_any_order_become_a_recording(rows):
     scans = list(from_rows(rows).scans())
     assert scans_of(Detections.from_scans(scans[::-1])) == as_sets(rows)

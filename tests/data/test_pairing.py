@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph import Detections, Scan, Tracker, load_config
@@ -50,7 +50,6 @@ def test_decimal_times_are_as_far_apart_as_they_read() -> None:
     assert paired_times(np.array([0.12, 0.13]), np.array([0, 1]), 0.01).tolist() == [0.13, 0.13]
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     looks=st.sets(st.tuples(st.integers(0, 40), st.integers(0, 2)), min_size=1, max_size=30),
     within=st.integers(0, 15),

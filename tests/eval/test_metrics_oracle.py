@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.eval.frames import build_frames
@@ -53,7 +53,6 @@ def assert_equal(ours, theirs):
 
 
 @pytest.mark.parametrize(("oracle", "package"), ORACLES)
-@settings(max_examples=60, deadline=None)
 @given(
     seeds=st.lists(st.integers(0, 2**32 - 1), min_size=1, max_size=3), iou=st.sampled_from([0.3, 0.5, 0.75])
 )

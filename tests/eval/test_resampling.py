@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
@@ -57,7 +57,6 @@ def test_an_instant_known_to_have_no_tracks_ends_the_ones_before():
     assert not len(predict_to(table, np.array([1.1]), instants=np.array([1.0, 1.05])).frame)
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_causal_estimates_do_not_change_when_later_rows_do(seed):
     rng = np.random.default_rng(seed)

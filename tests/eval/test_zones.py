@@ -7,7 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
@@ -85,7 +85,6 @@ def test_who_stands_at_the_edge_and_jitters_neither_comes_nor_goes(known):
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=30, deadline=None)
 def test_a_way_enters_and_leaves_as_its_points_close_by_say(seed):
     """Brute force: the same way with 2,000 points a step, each within the zone or not."""
     rng = np.random.default_rng(seed)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.detections import Detections, Scan
@@ -49,7 +49,6 @@ def recordings(draw) -> Detections:
     )
 
 
-@settings(max_examples=60, deadline=None)
 @given(recordings(), st.sampled_from(["d.csv", "d.parquet"]))
 def test_what_is_written_is_read_back_to_the_last_bit(detections, name):
     with tempfile.TemporaryDirectory() as folder:

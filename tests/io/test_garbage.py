@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
@@ -82,7 +82,6 @@ CONTENT = (TABLES | BARE | JSON | st.text(max_size=200)).map(
 
 
 @pytest.mark.parametrize("reader", [read_detections, read_truth, read_trajectories])
-@settings(max_examples=100, deadline=None)
 @given(name=st.sampled_from(NAMES), content=CONTENT)
 @example(name="f.csv", content=b't,sensor,left,top,width,height,score\n0,"rgb')
 @example(name="f.csv", content=b"t,sensor,left,top,width,height,score\n" + b"x" * 1_000_000)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
@@ -81,7 +81,6 @@ def test_values_come_back_to_the_digits_that_are_kept(tmp_path, name):
     assert after.sensor_text() == before.sensor_text()
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     n=st.integers(0, 30),
     seed=st.integers(0, 2**32 - 1),

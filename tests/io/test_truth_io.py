@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
@@ -61,7 +61,6 @@ def truths(draw) -> GroundTruth:
     )
 
 
-@settings(max_examples=60, deadline=None)
 @given(truths(), st.sampled_from(["g.csv", "g.parquet"]))
 def test_what_is_written_is_read_back_to_the_last_bit(truth, name):
     with tempfile.TemporaryDirectory() as folder:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.detections import Detections
@@ -102,7 +102,6 @@ class TestFirstFrame:
         assert Detections.from_pandas(frame.assign(frame=[0, 1]), rate_hz=HZ).scan_t.tolist() == [0.0, 0.05]
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     frames=st.lists(st.integers(0, 60), min_size=1, max_size=12, unique=True),
     lefts=st.lists(st.integers(0, 1000), min_size=12, max_size=12),

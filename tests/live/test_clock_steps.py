@@ -73,7 +73,7 @@ def test_a_pause_of_one_sensor_or_of_all_is_no_step(who, gap_s):
     assert all(one.t == true for true, one in taken)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(8))
 def test_a_backlog_that_is_caught_up_is_no_step(seed):
     """The pictures of a failure are lost; the events wait in the broker and come faster than in time."""
     rng = np.random.default_rng(seed)
@@ -94,7 +94,7 @@ def test_a_backlog_that_is_caught_up_is_no_step(seed):
     assert (found, together) == ([], [])
 
 
-@pytest.mark.parametrize("count", range(1, 12))
+@pytest.mark.parametrize("count", [1, 2, 3, 6, 11])
 def test_a_sensor_that_says_no_more_after_a_jump_is_not_held(count):
     """Its last scans go on when the others have gone on for a second."""
     times = [(t, s, t) for t, s in arrivals(6.0) if s == "rgb" or t < 3.0]

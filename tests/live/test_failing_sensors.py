@@ -82,7 +82,7 @@ def test_a_sensor_whose_clutter_rises_tenfold_loses_weight_and_is_named():
     rng = np.random.default_rng(2)
     health, tracker = SensorHealth(CONFIG), Tracker(CONFIG)
     clutter, events = [], []
-    for scan in scans_of(16.0):
+    for scan in scans_of(10.0):
         if scan.sensor == "evt" and scan.t > 3.0:
             false = np.column_stack([rng.uniform((0, 0), (1200, 680), (12, 2)), np.full((12, 2), 30.0)])
             scan = replace(
@@ -129,7 +129,7 @@ def test_rubbish_with_good_scores_is_named_and_harms_no_track(full):
         sensor, kind = which
         rng, health, tracker, events = np.random.default_rng(seed), SensorHealth(CONFIG), Tracker(CONFIG), []
         fixed = rng.uniform(*FIELD, (count, 2))
-        for k, scan in enumerate(scans_of(16.0)):
+        for k, scan in enumerate(scans_of(10.0)):
             if scan.sensor == sensor and scan.t > 3.0:
                 scan = with_rubbish(scan, kind, count, score, fixed, rng)
             table = tracker.step(scan)

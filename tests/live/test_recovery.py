@@ -127,7 +127,7 @@ def happen(world, kind, first, second, third):
             world.session.accept(decode_scans(json.dumps(refused).encode(), "x", 1))
 
 
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(
     events=st.lists(EVENT, min_size=1, max_size=12),
     form=st.sampled_from(["one", "two", "apart"]),
@@ -176,22 +176,22 @@ def steps(live, messages):
 def test_messages_of_two_sensors_with_a_wrong_time_are_witnesses_and_no_proof(count, jump_s, policy):
     live = live_of(policy)
     wrong = [both(2.0 + jump_s + k / RATE_HZ) for k in range(count)]
-    said, taken = steps(live, [*in_order(0.0, 2.0), *wrong, *in_order(2.0, 10.0)])
-    assert taken == RATE_HZ * 12.0
+    said, taken = steps(live, [*in_order(0.0, 2.0), *wrong, *in_order(2.0, 3.0)])
+    assert taken == RATE_HZ * 5.0
     assert sum(len(one.refuted) for one in said) == (2 if jump_s == 1e300 else 2 * count)
-    assert said[-1].t == pytest.approx(12.0 - 1 / RATE_HZ)
+    assert said[-1].t == pytest.approx(5.0 - 1 / RATE_HZ)
     assert 1 in said[-1].table.track_id  # the track of before
 
 
 @pytest.mark.parametrize(("count", "lost"), [(3, 3), (8, 8), (40, 100)])
 @pytest.mark.parametrize("policy", ["rewind", "skip"])
 def test_wrong_messages_that_were_believed_cost_as_many_or_five_seconds(count, lost, policy):
-    """What waited is taken as well, so that only answers are lost: 3 to 100 of 400."""
+    """What waited is taken as well, so that only answers are lost: 3 to 100 of 160."""
     wrong = [both(1e9 + k / RATE_HZ) for k in range(count)]
-    said, taken = steps(live_of(policy), [*in_order(0.0, 2.0), *wrong, *in_order(2.0, 20.0)])
+    said, taken = steps(live_of(policy), [*in_order(0.0, 2.0), *wrong, *in_order(2.0, 8.0)])
     assert [one.leapt for one in said].count(True) == [one.reset for one in said].count(True) == 1
-    assert taken == 40 + count - 2 + 400 - lost
-    assert said[-1].t == pytest.approx(22.0 - 1 / RATE_HZ)
+    assert taken == 40 + count - 2 + 160 - lost
+    assert said[-1].t == pytest.approx(10.0 - 1 / RATE_HZ)
     assert len(said[-1].table) == 1
 
 
@@ -225,17 +225,17 @@ def test_slow_sensors_are_near_themselves():
 @pytest.mark.parametrize("policy", ["rewind", "skip"])
 def test_a_recording_of_three_seconds_in_a_loop_starts_anew_again_and_again(policy):
     """No time of it is ever as late as `live.jump_s`."""
-    said, _ = steps(live_of(policy), [both(3.0 * (k % 60) / 60, number=k) for k in range(60 * 20)])
+    said, _ = steps(live_of(policy), [both(3.0 * (k % 60) / 60, number=k) for k in range(60 * 9)])
     gaps = [k for k, one in enumerate(said) if one.taken]
     assert max(b - a for a, b in pairwise(gaps)) <= 5.2 * RATE_HZ
-    assert sum(one.reset for one in said) > 4
+    assert sum(one.reset for one in said) > 2
 
 
 @pytest.mark.parametrize("step_s", [1e-6, 0.0])
 def test_a_clock_that_hardly_moves_is_believed_after_a_thousand_messages(step_s):
     live = live_of()
     steps(live, in_order(500.0, 1.0))
-    said, _ = steps(live, [both(100.0 + step_s * k, number=k) for k in range(1500)])
+    said, _ = steps(live, [both(100.0 + step_s * k, number=k) for k in range(1050)])
     assert sum(one.reset for one in said) == (step_s > 0.0)  # of one that stands, all is the same scan
     assert len(live._base.row) <= 1000
 
@@ -247,28 +247,28 @@ def test_a_state_with_a_wrong_time_heals_when_it_is_loaded(wrong, policy, tmp_pa
     steps(live, [*in_order(0.0, 2.0), *[both(1e9 + k / RATE_HZ) for k in range(wrong)]])
     live.save(tmp_path / "state.npz")
     again, _ = LiveTracker.load(tmp_path / "state.npz")
-    said, taken = steps(again, in_order(2.0, 10.0))
+    said, taken = steps(again, in_order(2.0, 4.0))
     assert not any(one.repeated for one in said)
-    assert taken >= 200 - 3
-    assert said[-1].t == pytest.approx(12.0 - 1 / RATE_HZ)
+    assert taken >= 80 - 3
+    assert said[-1].t == pytest.approx(6.0 - 1 / RATE_HZ)
 
 
 @pytest.mark.parametrize("policy", ["rewind", "skip"])
 def test_a_clock_that_was_set_back_while_nobody_ran_is_no_repetition(policy, tmp_path):
     """After a power cut the sensors count from 0 again; the same input given once more is known as such."""
     live = live_of(policy)
-    messages = in_order(0.0, 60.0)
+    messages = in_order(0.0, 20.0)
     steps(live, messages)
     live.save(tmp_path / "state.npz")
     again, _ = LiveTracker.load(tmp_path / "state.npz")
     said, taken = steps(again, messages)
     assert taken == 0
     assert all(len(one.repeated) == 2 for one in said)
-    rebooted = [both(k / RATE_HZ, -7.0, k + 13) for k in range(400)]
+    rebooted = [both(k / RATE_HZ, -7.0, k + 13) for k in range(200)]
     said, taken = steps(again, rebooted)
     assert sum(one.reset for one in said) == 1
-    assert taken >= 400 - 110
-    assert said[-1].t == pytest.approx(20.0 - 1 / RATE_HZ)
+    assert taken >= 200 - 110
+    assert said[-1].t == pytest.approx(10.0 - 1 / RATE_HZ)
 
 
 @given(st.integers(0, 2**32), st.integers(1, 6 * CAPACITY))
@@ -294,7 +294,7 @@ def message(seq, t, sensor="rgb", source="g7"):
     return decode_scans(json.dumps({"v": 1, "source": source, "seq": seq, "scans": [scan]}).encode(), "x", 1)
 
 
-@pytest.mark.parametrize("taken", [100, 3000])
+@pytest.mark.parametrize("taken", [100, 1300])
 def test_a_source_that_counts_anew_with_its_clock_set_back_was_started_again(taken):
     duplicates = Duplicates()
     assert all(duplicates.is_new(message(k, 5000.0 + 0.05 * k)) for k in range(taken))
@@ -328,19 +328,19 @@ def session_of(live=None, file=None, more=None):
 
 def test_a_sensor_of_which_nothing_is_taken_is_named_again_and_again():
     session, answered, said = session_of()
-    for k in range(20 * 120):
+    for k in range(20 * 30):
         session.accept(message(None, k / 20, "rgb"))
         session.accept(message(None, k / 20 + 3600.0, "evt"))
-    assert len(answered) == 20 * 120
+    assert len(answered) == 20 * 30
     told = [text for text in said if "none of the last" in text]
     assert told[0] == (
         "warning: none of the last 100 scans of sensor 'evt' has been taken: the time 3604.950 s is "
         "3600.000 s after the newest, 4.950 s"
     )
-    assert len(told) == 5
-    for k in range(20 * 120, 20 * 121):
+    assert len(told) == 3
+    for k in range(20 * 30, 20 * 31):
         session.accept(message(None, k / 20, "evt"))
-    assert any("scans of sensor 'evt' are taken again, after 2400" in text for text in said)
+    assert any("scans of sensor 'evt' are taken again, after 600" in text for text in said)
 
 
 def test_messages_that_were_all_taken_before_are_told_of():

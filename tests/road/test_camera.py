@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from road_scenes import camera, see
 
@@ -36,7 +36,6 @@ def test_simulators_camera_is_the_same_without_distortion() -> None:
     np.testing.assert_allclose(own, simulated.rotation, atol=1e-15)
 
 
-@settings(deadline=None, max_examples=60)
 @given(x=st.floats(-8, 12), y=st.floats(15, 120), z=st.floats(0, 1.5), k1=st.floats(-0.15, 0.15))
 def test_to_road_undoes_project(x: float, y: float, z: float, k1: float) -> None:
     cam = camera(k1=k1)

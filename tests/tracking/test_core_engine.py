@@ -99,7 +99,6 @@ def assert_alike(one, other, what, atol=_RELATIVE):
     np.testing.assert_allclose(one[4], other[4], atol=_RELATIVE, err_msg=what)
 
 
-@settings(max_examples=80, deadline=None)
 @given(seed=st.integers(0, 10**6), sensors=st.integers(1, 4), known=st.booleans(), motions=st.booleans())
 def test_every_step_is_the_references(seed, sensors, known, motions):
     core, reference = models("engine=none", known)

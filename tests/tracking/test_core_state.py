@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph import Scan, Tracker, load_config
@@ -114,7 +114,6 @@ def test_times_below_0_are_no_damage_though_two_sensors_have_not_been_compared_y
     assert bytes_of(Tracker.load(tmp_path / "state.npz").causal()) == bytes_of(tracker.causal())
 
 
-@settings(max_examples=30)
 @given(
     seed=st.integers(0, 10**6),
     cut=st.integers(0, 30),

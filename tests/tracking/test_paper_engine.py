@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
@@ -190,7 +190,6 @@ def pairs_of(d2, gate):
     return Pairs(row, column, d2[row, column])
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.integers(1, 9))
 def test_the_assignment_is_the_hungarian_algorithms_with_infinite_entries(seed, n, m):
     d2, gate = np.random.default_rng(seed).uniform(0, 40, (n, m)), 9.2
@@ -204,7 +203,6 @@ def test_the_assignment_is_the_hungarian_algorithms_with_infinite_entries(seed, 
     assert (np.diff(row) > 0).all()
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 7), st.integers(1, 7))
 def test_second_views_are_those_of_the_tracks_in_turn(seed, n, m):
     d2, gate = np.random.default_rng(seed).uniform(0, 20, (n, m)), 9.2

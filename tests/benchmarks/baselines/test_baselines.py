@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.baselines import baseline_frames, run_baseline
@@ -104,7 +104,6 @@ def test_of_several_sensors_the_first_sets_the_frames_and_the_latest_scans_are_m
     assert len(frames[2].boxes) == 0
 
 
-@settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), n=st.integers(0, 20), iou=st.floats(0.1, 0.9))
 def test_suppression_keeps_no_two_that_overlap_and_drops_only_what_a_better_one_covers(seed, n, iou):
     rng = np.random.default_rng(seed)

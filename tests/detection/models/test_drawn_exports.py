@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
@@ -51,7 +51,6 @@ def expected(made):
     return f"layout {name}{'-obb' if made.task == 'obb' else ''},"
 
 
-@settings(max_examples=30, deadline=None)
 @given(made=exports(), backend=st.sampled_from(BACKENDS))
 def test_the_two_boxes_come_back(tmp_path_factory, made, backend):
     if backend == "onnxruntime":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import ConfigError
@@ -23,7 +23,6 @@ def events(count: int, rate_hz: float, size: tuple[int, int], seed: int, start_s
 cameras = st.sampled_from([(346, 260), (640, 480), (1280, 720)])
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     order=st.sampled_from(["txyp", "xypt", "xytp", "ptxy", "tpxy"]),
     size=cameras,
@@ -53,7 +52,6 @@ def test_columns_that_are_no_events_have_no_order():
     assert orders_of([t[:0], y[:0], y[:0], p[:0]]) == []
 
 
-@settings(max_examples=80, deadline=None)
 @given(
     size=cameras,
     hz_px=st.floats(0.25, 18.0),
@@ -69,7 +67,6 @@ def test_the_unit_of_a_usual_recording_is_told(size, hz_px, unit, start_s, seed)
 
 @example(size=(1280, 720), hz_px=407.0, unit="ms", seed=0)
 @example(size=(1280, 720), hz_px=326.0, unit="ns", seed=0)
-@settings(max_examples=80, deadline=None)
 @given(
     size=cameras,
     hz_px=st.floats(1e-4, 450.0),

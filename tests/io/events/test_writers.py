@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.errors import DataError
@@ -81,7 +81,6 @@ def test_the_bytes_do_not_depend_on_the_pieces(tmp_path, fmt):
     assert one == other
 
 
-@settings(max_examples=30)
 @given(
     rows=st.lists(
         st.tuples(st.integers(0, 30_000_000), st.integers(0, 1279), st.integers(0, 719), st.integers(0, 1)),

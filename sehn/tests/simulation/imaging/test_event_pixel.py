@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph.data.events import EventArray
@@ -74,7 +74,6 @@ def test_what_does_not_change_makes_no_event() -> None:
     assert len(run(1000.0 * np.arange(200), light, **{**QUIET, "threshold_sigma": 0.03})) == 0
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(0.01, 100.0), min_size=2, max_size=20), st.floats(0.05, 0.6))
 def test_the_events_add_up_to_the_signal_within_a_threshold(levels: list[float], threshold: float) -> None:
     light = np.array(levels)[:, None]

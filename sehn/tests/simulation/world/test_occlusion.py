@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from jeat_graph_sehn.simulation.world.occlusion import visible_fraction
@@ -24,7 +24,6 @@ def test_a_box_in_another_frame_hides_nothing() -> None:
     assert visible_fraction(boxes, np.array([20.0, 10.0]), np.array([0, 1])) == pytest.approx([1.0, 1.0])
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(1, 9), st.integers(0, 10**6))
 def test_fractions_equal_those_of_painted_pixels(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
