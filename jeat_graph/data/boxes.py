@@ -12,6 +12,7 @@ from jeat_graph.data.errors import DataError
 
 #: Smallest side, and farthest place or largest side, of a box (px): beyond what any picture can hold.
 SMALLEST_PX, LARGEST_PX = 1e-9, 1e6
+_NO_TENSORS = (np.ndarray, list)
 
 
 def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -48,6 +49,8 @@ def check_boxes(boxes: npt.ArrayLike, scores: npt.ArrayLike) -> tuple[FloatArray
 
 def detached(values: Any) -> Any:
     """Return a tensor, wherever it lies and whatever learns from it, as an array can be made of it."""
+    if type(values) in _NO_TENSORS:
+        return values
     for step in ("detach", "cpu"):
         values = getattr(values, step)() if hasattr(values, step) else values
     return values

@@ -6,6 +6,7 @@ One without boxes is data too: it says that the sensor looked and found nothing.
 from __future__ import annotations
 
 import contextlib
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,6 +85,8 @@ def time_of(t: Any) -> float:
     Raises:
         DataError: it is none, or not finite.
     """
+    if type(t) is float and math.isfinite(t):
+        return t
     dated = getattr(getattr(t, "dtype", None), "kind", "") in ("m", "M")  # of ns, it would pass for a number
     try:
         number = np.nan if dated else float(t)
@@ -123,16 +126,18 @@ def scan_with_area(
         DataError: as `Scan` does.
     """
     columns: list[Any] = [boxes, scores, classes, embeddings]
-    flat = np.zeros(0, dtype=bool)
+    flat = None
     with contextlib.suppress(TypeError, ValueError, OverflowError):  # what is no array is named by `Scan`
         table = np.asarray(boxes, dtype=np.float64)
         if table.ndim == 2 and table.shape[1] == 4:
-            columns[0], flat = table, without_area(table)
-        if flat.any() and all(one is None or len(one) == len(flat) for one in columns):
+            columns[0] = table
+            # Of most scans no box has been clipped, which one look at all sides says.
+            flat = without_area(table) if len(table) and not table[:, 2:].min() > 0.0 else None
+        if flat is not None and flat.any() and all(one is None or len(one) == len(flat) for one in columns):
             columns = [None if one is None else np.asarray(one)[~flat] for one in columns]
     motion = None if camera_motion is None else motion_of(camera_motion)
     made = Scan(t, sensor, columns[0], columns[1], columns[2], columns[3], motion)
-    return made, int(flat.sum())
+    return made, 0 if flat is None else int(flat.sum())
 
 
 def trusted_scan(

@@ -162,6 +162,8 @@ class ClockSteps:
                 take.append(scan)
             else:
                 fresh.append(scan)
+        if not fresh and not self._doubts:
+            return Judged(take, [], [], [])
         for scan in fresh:
             doubt = self._doubts.get(scan.sensor)
             if doubt is None:

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.data.scan import trusted_scan
 from jeat_graph.runs.clock_comparison import (
     LEAST_S,
     ClockComparison,
@@ -219,7 +220,7 @@ class ClockWatch:
             return 0
         one.odd = 0
         step_s = t - one.newest if one.scans else 0.0
-        one.scans.append(Scan(t, scan.sensor, scan.boxes, scan.scores))
+        one.scans.append(trusted_scan(t, scan.sensor, scan.boxes, scan.scores, None, None, None))
         while one.scans[0].t < t - WINDOW_S:
             one.scans.popleft()
         return math.ceil(_STEPS_A_SECOND * step_s)

@@ -25,6 +25,8 @@ LEAST_REAL = 0.05
 LEAST_CLUTTER = 1.0
 # Weight of one judgement in what is usual.
 _FOLLOWS = 0.02
+#: Of a sensor that nobody declared; made once, since each message asks.
+_UNDECLARED = SensorConfig()
 
 
 class HealthChange(NamedTuple):
@@ -111,7 +113,7 @@ class SensorHealth:
 
     def _patience_s(self, sensor: str) -> float:
         """Return after how long without a scan a sensor counts as silent (s)."""
-        live, declared = self._config.live, self._config.sensors.get(sensor, SensorConfig())
+        live, declared = self._config.live, self._config.sensors.get(sensor, _UNDECLARED)
         return max(live.silent_s, live.silent_periods / declared.rate_hz)
 
     def jumped(self, now: float) -> None:

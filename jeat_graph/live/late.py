@@ -201,13 +201,14 @@ class LiveTracker(OneAtATime):
     def _admit(self, scans: list[Scan]) -> Admitted:
         """Take in scans that need not wait, as far as their times are believed."""
         before = self.tracker.time
-        decision = self._decide(scans)
+        decision = self._decide(scans, before)
         taken = self._take_all(decision.take)
         self.lateness.arrived(taken, decision.refuted, before)
-        self._hand_over()
+        now = self.tracker.time
+        self._hand_over(now)
         if any(one.good for one in taken) and not (decision.leapt or decision.reset):
-            self._base.took(before, self.tracker.time)
-        return Admitted(scans, decision, taken, self.tracker.time or 0.0, self._answer())
+            self._base.took(before, now)
+        return Admitted(scans, decision, taken, now or 0.0, self._answer())
 
     def _answer(self) -> Trajectories:
         table = self.tracker.causal()
@@ -262,6 +263,8 @@ class LiveTracker(OneAtATime):
 
     def _take_all(self, batch: list[Scan]) -> list[Taken]:
         """Take in scans of any times, all or none."""
+        if len(batch) == 1:
+            return [self._take(batch)]
         times = sorted({scan.t for scan in batch})
         mark = (self._rewinding.mark(), self._newest) if len(times) > 1 else None
         try:
@@ -272,14 +275,14 @@ class LiveTracker(OneAtATime):
                 self._newest, self._due, self.measured = mark[1], [], []
             raise
 
-    def _decide(self, batch: list[Scan]) -> Decision:
+    def _decide(self, batch: list[Scan], now: float | None) -> Decision:
         """Decide what becomes of scans that have not come before, and let time start over where it must."""
-        now, t = self.tracker.time, max(scan.t for scan in batch)
+        t = max([scan.t for scan in batch])
         if self._repetition.first is None:
             self._repetition.first = t
         if now is not None and t < now and self.policy == REFUSE:
             return Decision(batch, [])
-        late = not any(self._may_come(scan) for scan in batch)
+        late = not any(self._may_come(scan, now) for scan in batch)
         last_scan = {}
         if late or not self._base.near(t, now):
             last_scan = self.tracker.last_scans()
@@ -370,14 +373,14 @@ class LiveTracker(OneAtATime):
         doubted = self._clock_steps.clear()
         if doubted:
             self._take_all(doubted)
-            self._hand_over()
+            self._hand_over(self.time)
         if self._room is not None:
             self._take_all(self._room.clear())
-            self._hand_over()
+            self._hand_over(self.time)
         held = self._base.clear()
         if held and self.tracker.time is not None and min(scan.t for scan in held) > self.tracker.time:
             self._take_all(held)
-            self._hand_over()
+            self._hand_over(self.time)
         self._rewinding.settle(math.inf)
         return self.tracker.finish()
 
@@ -417,7 +420,7 @@ class LiveTracker(OneAtATime):
         good: dict[str, Scan] = {}
         dropped = []
         for scan in batch:
-            if scan.sensor not in good and self._may_come(scan):
+            if scan.sensor not in good and self._may_come(scan, now):
                 good[scan.sensor] = scan
             else:
                 dropped.append(scan)
@@ -433,9 +436,8 @@ class LiveTracker(OneAtATime):
             return (self.time is not None and scan.t < self.time) or scan.sensor in self._newest
         return scan.t <= self._rewinding.settled or self._rewinding.knows(scan)
 
-    def _may_come(self, scan: Scan) -> bool:
-        """Whether a scan can be taken: it is in time, and its sensor has given none of that time."""
-        now = self.tracker.time
+    def _may_come(self, scan: Scan, now: float | None) -> bool:
+        """Whether a scan can be taken at a time (s): it is not late, and its sensor gave none of it."""
         if now is None:
             return True
         if self.policy != REWIND:
@@ -458,10 +460,10 @@ class LiveTracker(OneAtATime):
         if self.tracker.has_diagnostics:
             self.measured.append((scans[0].t, self.tracker.last_measurements()[0]))
 
-    def _hand_over(self) -> None:
-        """Tell the smoothers of all that cannot be taken again."""
+    def _hand_over(self, now: float | None) -> None:
+        """Tell the smoothers of all that cannot be taken again at a time (s)."""
         for taken in self._due:
             self.tracker.hand_over(taken)
         self._due = []
-        if self.policy == REWIND and self.tracker.time is not None:
-            self._rewinding.settle(self.tracker.time - self._keep_s)
+        if self.policy == REWIND and now is not None:
+            self._rewinding.settle(now - self._keep_s)

@@ -83,7 +83,9 @@ class LatenessCounter:
 
     def add(self, sensor: str, late_s: float, dropped: bool) -> None:
         """Count a scan that is so much older than the newest (s); 0 if it is not."""
-        one = self._by_sensor.setdefault(sensor, _Counted())
+        one = self._by_sensor.get(sensor)
+        if one is None:
+            one = self._by_sensor[sensor] = _Counted()
         late_s = min(late_s, sys.float_info.max)  # from one end of the numbers to the other it is infinite
         one.bins[round(min(late_s / BIN_S, BINS - 1))] += 1
         one.late += late_s > 0.0

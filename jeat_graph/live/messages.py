@@ -29,7 +29,8 @@ MOST_CHARACTERS, MOST_SEQ = 256, 1 << 63
 _KEYS = ("v", "source", "seq", "scans")
 # MessagePack has times of its own, which its package gives in seconds since 1970 when told so.
 _TIMESTAMP_S = 1
-_FIRST_OF_TEXT = b" \t\r\n{[\xef"
+_FIRST_OF_TEXT = frozenset(bytes([c]) for c in b" \t\r\n{[\xef")
+_ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
 
 
 class ScanMessage(NamedTuple):
@@ -99,13 +100,13 @@ def encode_tracks(line: str, seq: int, answered: ScanMessage | None, encoding: s
     if answered is not None and answered.seq is not None:
         head |= {"source": answered.source, "of": answered.seq}
     if encoding == "json":
-        text = json.dumps(head, ensure_ascii=False, separators=(",", ":"))
+        text = _ENCODER.encode(head)
         return (text[:-1] + "," + line.strip()[1:]).encode()
     return bytes(msgpack_package().packb(head | json.loads(line)))
 
 
 def _load(payload: bytes, name: str, number: int) -> Any:
-    if payload[:1] in [bytes([c]) for c in _FIRST_OF_TEXT]:
+    if payload[:1] in _FIRST_OF_TEXT:
         try:
             return json.loads(payload)
         except (ValueError, RecursionError) as error:

@@ -71,6 +71,8 @@ class Rewinding:
 
     def place(self, t: float) -> int:
         """Return the place among the steps of the first that is not before a time (s)."""
+        if not self.steps or t > self.steps[-1].t:  # nearly always: of a scan that is not late
+            return len(self.steps)
         return bisect_left(self.steps, t, key=lambda step: step.t)
 
     def knows(self, scan: Scan) -> bool:

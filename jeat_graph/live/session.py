@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -167,7 +166,8 @@ class Session:
             self._health.jumped(arrival.t)
         if self.ends.smoothed is not None:
             self.ends.smoothed.begin(arrival.table.classes is not None)
-        with self._owing():
+        self._owed = True
+        try:
             for t, table, late_s in arrival.earlier:
                 self.ends.tracks(t, table, message, late_s)
             if unanswered < len(message.batch.scans) or (arrival.waiting and arrival.taken):
@@ -181,6 +181,10 @@ class Session:
                 if before is not None:
                     for event in self._health.judge(self.live.tracker.sensor_states(), arrival.t):
                         self._tell(event)
+        except UnconfirmedError as error:
+            self._unconfirmed = str(error)
+            raise
+        self._owed = False
         self._save_in_time(arrival.t)
         return arrival
 
@@ -275,17 +279,6 @@ class Session:
         ]
         counts = Counts(self.bad, self.duplicates, self.flat, self.too_large, self._seen.forgotten)
         return lines + count_lines(counts, self._seen.restarts)
-
-    @contextlib.contextmanager
-    def _owing(self) -> Iterator[None]:
-        """While an answer goes out: what breaks off in here leaves a state that is not to be saved."""
-        self._owed = True
-        try:
-            yield
-        except UnconfirmedError as error:
-            self._unconfirmed = str(error)
-            raise
-        self._owed = False
 
     def _all_out(self) -> bool:
         """Whether all answers have arrived; waits for those that are on their way."""

@@ -98,6 +98,8 @@ class SessionWarnings:
         """Tell, again and again, of sensors of which nothing is taken, and of the end of that."""
         for name, run in self._untaken.taken(scan.sensor for scan in arrival.taken):
             self._warn(f"warning: {place}scans of sensor {name!r} are taken again, after {run.count}")
+        if not (arrival.held or arrival.dropped):
+            return
         taken = {scan.sensor for scan in arrival.taken}
         missed = {s.sensor: s.t for s in (*arrival.held, *arrival.dropped) if s.sensor not in taken}
         for name, t in sorted(missed.items()):

@@ -105,7 +105,8 @@ class TimeBase:
 
     def near(self, t: float, now: float | None) -> bool:
         """Whether a time is near the newest one (s)."""
-        return now is None or abs(t - now) <= self.bound_s
+        # The bound is never less than `jump_s`, and finding it takes longer.
+        return now is None or abs(t - now) <= self._jump_s or abs(t - now) <= self.bound_s
 
     def holds(self, scan: Scan) -> bool:
         """Whether the sensor's scan of that time waits already."""

@@ -69,6 +69,8 @@ class Untaken:
 
     def taken(self, names: Iterable[str]) -> list[tuple[str, UntakenRun]]:
         """Note whose were taken; returns the runs that had been told of and end now."""
+        if not self._runs:
+            return []
         ended = [(name, self._runs.pop(name)) for name in set(names) if name in self._runs]
         return sorted((name, run) for name, run in ended if run.reported)
 

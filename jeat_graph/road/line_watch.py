@@ -102,20 +102,24 @@ class LineWatch:
         if not len(table) and not self._ways:
             return []
         boxes = table.boxes
-        foot = np.stack([boxes[:, 0] + 0.5 * boxes[:, 2], boxes[:, 1] + boxes[:, 3]], axis=1)
+        foot = np.empty((len(boxes), 2))
+        foot[:, 0], foot[:, 1] = boxes[:, 0] + 0.5 * boxes[:, 2], boxes[:, 1] + boxes[:, 3]
         place = self._camera.to_road(foot) if len(foot) else foot
         # What the picture cuts off at its lower edge stands nowhere that is seen.
         seen = np.isfinite(place).all(axis=1) & (foot[:, 1] < self._camera.height - 1.0)
         beyond = (place - self._start) @ self._beyond
         share = (place - self._start) @ self._along / self._length
-        for k in np.flatnonzero(seen):
-            way = self._ways.setdefault(int(table.track_id[k]), _Way())
+        rows = zip(table.track_id.tolist(), beyond.tolist(), share.tolist(), place.tolist(), strict=True)
+        for k, (identity, ahead, part, (x, y)) in enumerate(rows):
+            if not seen[k]:
+                continue
+            way = self._ways.get(identity)
+            if way is None:
+                way = self._ways[identity] = _Way()
             way.kind = "" if table.classes is None else str(table.classes[k])
             if not way.reported:
-                self._goes(
-                    way, t, (float(beyond[k]), float(share[k]), float(place[k, 0]), float(place[k, 1]))
-                )
-        return [one for one in map(self._passage, [t] * len(self._ways), list(self._ways)) if one is not None]
+                self._goes(way, t, (ahead, part, x, y))
+        return [one for identity in list(self._ways) if (one := self._passage(t, identity)) is not None]
 
     def _goes(self, way: _Way, t: float, place: tuple[float, float, float, float]) -> None:
         """Add a place; the line is passed between two of them."""

@@ -51,16 +51,19 @@ def save_state(path: str | Path, config: Config, state: dict[str, Any]) -> None:
     write_state_file(path, described, block)
 
 
+#: A process may track many cameras, each with a configuration of its own.
+_MOST_HEADS = 128
 _heads: dict[int, tuple[Config, bytes]] = {}
 
 
 def _head(config: Config) -> bytes:
-    """What the file says of its origin; made once for the configuration of the last call, which is frozen."""
+    """What the file says of its origin; made once for each configuration of late, which are frozen."""
     known = _heads.get(id(config))
     if known is None:
         head = {"kind": _MAGIC, "format": FORMAT, "version": __version__, "config": config_to_dict(config)}
         known = config, json.dumps(head).encode()
-        _heads.clear()
+        while len(_heads) >= _MOST_HEADS:
+            del _heads[next(iter(_heads))]
         _heads[id(config)] = known
     return known[1]
 

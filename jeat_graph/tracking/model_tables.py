@@ -15,7 +15,8 @@ from jeat_graph.tracking.classes import ClassTally
 
 #: Sensors of which all combinations are listed beforehand.
 _MOST_LISTED = 8
-_MOTION = [singer.POSITION, singer.VELOCITY, singer.ACCELERATION]
+#: Position, velocity and acceleration, which stand side by side.
+_MOTION = slice(singer.POSITION, singer.ACCELERATION + 1)
 
 
 class ClassNames(NamedTuple):

@@ -14,6 +14,17 @@ from jeat_graph.data.errors import JeatGraphError
 Kind = TypeVar("Kind", bound=type)
 #: Between two looks at whether the process is another one (s).
 _BETWEEN_S = 0.2
+#: Of this process; asking the system each time a lock is taken takes longer than the lock.
+_process_id = os.getpid()
+
+
+def _forked() -> None:
+    global _process_id
+    _process_id = os.getpid()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forked)
 
 
 class ThreadLock:
@@ -23,7 +34,7 @@ class ThreadLock:
         self._lock = threading.RLock()
         self._process = 0
 
-    def __enter__(self) -> None:
+    def acquire(self) -> None:
         """Wait for the other threads.
 
         Raises:
@@ -31,15 +42,23 @@ class ThreadLock:
         """
         if not self._lock.acquire(blocking=False):
             while not self._lock.acquire(timeout=_BETWEEN_S):
-                if self._process != os.getpid():
+                if self._process != _process_id:
                     raise JeatGraphError(
                         "this process was forked while another thread used the tracker: fork between its "
                         "steps, or make a tracker in the new process (Tracker.load)"
                     )
-        self._process = os.getpid()
+        self._process = _process_id
+
+    def release(self) -> None:
+        """Let the next thread have it."""
+        self._lock.release()
+
+    def __enter__(self) -> None:
+        """Wait for the other threads, as `acquire`."""
+        self.acquire()
 
     def __exit__(self, *error: object) -> None:
-        self._lock.release()
+        self.release()
 
     def __deepcopy__(self, memo: dict[int, Any]) -> ThreadLock:
         """Return a lock of its own."""
@@ -79,8 +98,12 @@ def one_at_a_time(names: str) -> Callable[[Kind], Kind]:
     def locked(method: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(method)
         def call(self: OneAtATime, *arguments: Any, **settings: Any) -> Any:
-            with self._lock:
+            lock = self._lock
+            lock.acquire()
+            try:
                 return method(self, *arguments, **settings)
+            finally:
+                lock.release()
 
         return call
 

@@ -98,6 +98,8 @@ def _brought_together(held: ScanBatch, part: ScanBatch) -> ScanBatch:
 
 def in_order(batch: ScanBatch) -> ScanBatch:
     """Put a batch's sensors in alphabetical order."""
+    if len(batch.scans) == 1:
+        return batch
     order = sorted(range(len(batch.scans)), key=lambda k: batch.scans[k].sensor)
     scans, lines = [batch.scans[k] for k in order], [batch.lines[k] for k in order]
     return batch._replace(scans=scans, lines=lines)

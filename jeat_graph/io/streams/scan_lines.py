@@ -28,6 +28,7 @@ _CLASSES, _CLASS_ID, _EMBEDDINGS, _VIDEO = "classes", "class_id", "embeddings", 
 #: Identities that another tracker has given: passed over, as they are in tables.
 _PASSED_OVER = ("tracker_id", "track_id")
 _MORE = (_CLASSES, _CLASS_ID, _EMBEDDINGS, CAMERA_MOTION, _VIDEO)
+_KNOWN = frozenset((*_KEYS, *_TIMES, *_MORE, *_PASSED_OVER))
 
 
 def read_batches(
@@ -147,11 +148,11 @@ def batch_of(content: Any, name: str, number: int, how: StreamReading | None = N
 
 def _scan_of(item: Any, how: StreamReading) -> tuple[Scan, int] | None:
     """The scan, and how many boxes without area were left out of it; None of one of another video."""
-    example = '{"t": 0.05, "sensor": "rgb", "boxes": [[10, 20, 30, 40]], "scores": [0.9]}'
     if not isinstance(item, dict):
+        example = '{"t": 0.05, "sensor": "rgb", "boxes": [[10, 20, 30, 40]], "scores": [0.9]}'
         raise DataError(f"a scan is an object such as {example}")
-    strange = next((key for key in item if key not in (*_KEYS, *_TIMES, *_MORE, *_PASSED_OVER)), None)
-    if strange is not None:
+    if not item.keys() <= _KNOWN:
+        strange = next(key for key in item if key not in _KNOWN)
         raise DataError(f"unknown key {strange!r}; a scan has {', '.join((*_KEYS, *_MORE))}")
     times = [key for key in _TIMES if key in item]
     if len(times) > 1:

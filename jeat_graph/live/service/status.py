@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -94,6 +93,21 @@ class Counted:
     checkpoints: int = 0
 
 
+class _Blocked:
+    """While a broker is waited for; a class of its own since each message asks twice for one."""
+
+    __slots__ = ("_status",)
+
+    def __init__(self, status: Status) -> None:
+        self._status = status
+
+    def __enter__(self) -> None:
+        self._status.begin_blocked()
+
+    def __exit__(self, *error: object) -> None:
+        self._status.end_blocked()
+
+
 @dataclass
 class Status:
     """The state of a service; written by its threads, read by those that answer questions.
@@ -143,15 +157,19 @@ class Status:
         """Note that the main thread does something."""
         self.beat = time.monotonic()
 
-    @contextmanager
-    def blocked(self) -> Iterator[None]:
+    def blocked(self) -> _Blocked:
         """While a broker that takes nothing is waited for: no sensor is listened to, and none is silent."""
+        return _Blocked(self)
+
+    def begin_blocked(self) -> None:
+        """A broker is waited for from now on."""
         self._blocked_since = time.monotonic()
-        try:
-            yield
-        finally:
+
+    def end_blocked(self) -> None:
+        """It is waited for no longer."""
+        if self._blocked_since is not None:
             self._blocked_s += time.monotonic() - self._blocked_since
-            self._blocked_since = None
+        self._blocked_since = None
 
     def listened_s(self) -> float:
         """A steady clock that stands still while no sensor is listened to (s)."""
