@@ -16,6 +16,9 @@ inline constexpr double kLog2E = 1.4426950408889634, kPi = 3.141592653589793;
 // ln 2 in two parts, the first with zeros at its end: its product with a whole number is exact.
 inline constexpr double kLn2High = 6.93147180369123816490e-01, kLn2Low = 1.90821492927058770002e-10;
 
+// What a bound that only saves work leaves for rounding, as a share.
+inline constexpr double kRounding = 1e-6;
+
 // 1/n, and 1/n!, for the series below.
 inline constexpr auto kReciprocals = [] {
     std::array<double, 26> out{};

@@ -75,11 +75,10 @@ private:
 
 // Whether any box touches so many others. No ordinary scan has one, and it costs less to see that than to choose.
 inline bool any_touches(std::span<const Sides> boxes, double number) {
-    const std::vector<Sides> sides(boxes.begin(), boxes.end());
-    const filters::ByLeft index(sides);
-    for (const Sides& box : sides) {
+    const filters::ByLeft index(boxes);
+    for (const Sides& box : boxes) {
         double touching = -1.0;  // itself
-        index.near(box, [&](std::size_t k) { touching += filters::intersection(box, sides[k]) > 0.0; });
+        index.near(box, [&](std::size_t, const Sides& other) { touching += filters::intersection(box, other) > 0.0; });
         if (touching >= number) return true;
     }
     return false;

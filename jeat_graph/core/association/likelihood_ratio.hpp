@@ -66,9 +66,29 @@ inline double sides_log_density(const std::array<double, 4>& y, const SidesExpec
     return log_add(cut, body);
 }
 
+// The largest squared distances of all sides, and of the other three where one is cut, at which a pair can have a gain
+// above 0. What is not of the sides gives `most`; where neither way gives half of what is needed, both together do not.
+struct Gates {
+    double whole, cut;
+
+    explicit Gates(const ModelConstants& c) : whole(c.gate), cut(c.cut_gate) {}
+    Gates(const SidesExpected& expected, double most, const ScanTerms& terms, const ModelConstants& c) {
+        const double nu = c.degrees_of_freedom, enough = most + kLn2High + kRounding;
+        const double peak = terms.student_constant - 0.5 * (expected.log_det[0] + expected.log_det[1]);
+        const double away = clamp((peak + enough) / ((nu + 4.0) / 2.0), 0.0, 100.0);
+        whole = std::min(c.gate, nu * (exp_of(away) - 1.0) * (1.0 + kRounding));
+        double cut_peak = kImpossible;
+        for (int axis = 0; axis < 2; ++axis)
+            cut_peak = std::max(cut_peak, -0.5 * expected.log_det[1 - axis] - expected.log_size[axis] -
+                                              0.5 * std::min(expected.log_left[axis], expected.log_right[axis]));
+        cut_peak += std::max(terms.logs.cut, terms.logs.uncovered) - 1.5 * filters::kLog2Pi + 2.0 * kLn2High;  // of four
+        cut = clamp(2.0 * (cut_peak + enough), 0.0, c.cut_gate);
+    }
+};
+
 // How far a box's left side (axis 0), or its top, may lie from the expected one at most.
-inline double reach(const SidesExpected& expected, int axis, const ModelConstants& c) {
-    const double whole = std::sqrt(std::max(c.gate, c.cut_gate) * expected.S[axis].ll);
+inline double reach(const SidesExpected& expected, int axis, const Gates& gates, const ModelConstants& c) {
+    const double whole = std::sqrt(std::max(gates.whole, gates.cut) * expected.S[axis].ll);
     return std::max(std::max(1.0, c.most_uncovered) * expected.size[axis], whole);
 }
 

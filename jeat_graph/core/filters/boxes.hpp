@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "constants.hpp"
@@ -53,55 +55,63 @@ inline Sides expected_corners(const double* mean) {
 // is no reason to look at all of them. A box that lies nowhere (NaN) is near none.
 class ByLeft {
 public:
-    explicit ByLeft(const std::vector<Sides>& boxes) : boxes_(boxes) {
-        order_.reserve(boxes.size());
+    explicit ByLeft(std::span<const Sides> boxes) {
+        std::vector<std::pair<double, std::size_t>> order;
+        order.reserve(boxes.size());
         for (std::size_t k = 0; k < boxes.size(); ++k) {
             if (std::isnan(boxes[k].left)) continue;
-            order_.push_back(k);
+            order.emplace_back(boxes[k].left, k);
             widest_ = std::max(widest_, boxes[k].width());
         }
-        std::sort(order_.begin(), order_.end(), [&](std::size_t a, std::size_t b) {
-            return boxes[a].left != boxes[b].left ? boxes[a].left < boxes[b].left : a < b;
-        });
-        if (order_.size() > kFewBoxes) sort_by_width();
+        std::sort(order.begin(), order.end());
+        entries_.reserve(order.size());
+        for (const auto& [left, k] : order) entries_.push_back({boxes[k], k});
+        if (entries_.size() > kFewBoxes) sort_by_width();
     }
-    // Call visit(k) for every box whose left side lies in [low, high].
+    // Call visit(k, box) for every box whose left side lies in [low, high].
     template <class Visit> void with_left_in(double low, double high, Visit visit) const {
-        visit_between(order_, low, high, visit);
+        visit_between(entries_, low, high, visit);
     }
-    // Call visit(k) for every box that may overlap another one.
+    // Call visit(k, box) for every box that may overlap another one.
     template <class Visit> void near(const Sides& box, Visit visit) const {
-        if (classes_.empty()) return visit_between(order_, box.left - widest_, box.right, visit);
-        for (const Class& one : classes_) visit_between(one.order, box.left - one.widest, box.right, visit);
+        const auto visit_beside = [&](std::size_t k, const Sides& other) {
+            if (other.top < box.bottom && other.bottom > box.top) visit(k, other);
+        };
+        if (classes_.empty()) return visit_between(entries_, box.left - widest_, box.right, visit_beside);
+        for (const Class& one : classes_) visit_between(one.entries, box.left - one.widest, box.right, visit_beside);
     }
 
 private:
     static constexpr std::size_t kFewBoxes = 256;
+    // Boxes lie here in their order, so that a visit reads memory from front to back.
+    struct Entry {
+        Sides box;
+        std::size_t k;
+    };
     struct Class {
         int exponent;
         double widest = 0.0;
-        std::vector<std::size_t> order{};
+        std::vector<Entry> entries{};
     };
 
     void sort_by_width() {
-        for (const std::size_t k : order_) {
-            const double width = boxes_[k].width();
+        for (const Entry& entry : entries_) {
+            const double width = entry.box.width();
             const int exponent = width > 0.0 ? std::ilogb(width) : std::numeric_limits<int>::min();
             auto at = std::find_if(classes_.begin(), classes_.end(), [&](const Class& one) { return one.exponent == exponent; });
             if (at == classes_.end()) at = classes_.insert(at, Class{exponent});
             at->widest = std::max(at->widest, width);
-            at->order.push_back(k);
+            at->entries.push_back(entry);
         }
     }
     template <class Visit>
-    void visit_between(const std::vector<std::size_t>& order, double low, double high, Visit& visit) const {
-        auto at = std::lower_bound(order.begin(), order.end(), low,
-                                   [&](std::size_t k, double value) { return boxes_[k].left < value; });
-        for (; at != order.end() && boxes_[*at].left <= high; ++at) visit(*at);
+    static void visit_between(const std::vector<Entry>& entries, double low, double high, Visit& visit) {
+        auto at = std::lower_bound(entries.begin(), entries.end(), low,
+                                   [](const Entry& entry, double value) { return entry.box.left < value; });
+        for (; at != entries.end() && at->box.left <= high; ++at) visit(at->k, at->box);
     }
 
-    const std::vector<Sides>& boxes_;
-    std::vector<std::size_t> order_;
+    std::vector<Entry> entries_;
     std::vector<Class> classes_;
     double widest_ = 0.0;
 };

@@ -71,10 +71,10 @@ inline std::vector<std::pair<std::size_t, std::size_t>> nearest_pairs(const std:
         const double y0 = t.y + moved[1] + moved[2] * (t.y - height / 2.0);
         // A box that is near in centre and in ln width has its left side near, too.
         const double dx = std::sqrt(kPairingGate * (t.Sx + allowance));
-        const double most = t.widest / 2.0;
-        index.with_left_in(x0 - dx - most, x0 + dx, [&](std::size_t j) {
-            const Sides& b = boxes[j];
+        const double dy = std::sqrt(kPairingGate * (t.Sy + allowance)) * (1.0 + kRounding), most = t.widest / 2.0;
+        index.with_left_in(x0 - dx - most, x0 + dx, [&](std::size_t j, const Sides& b) {
             const double x = (b.left + b.right) / 2.0 - x0, y = (b.top + b.bottom) / 2.0 - y0;
+            if (!(std::abs(y) <= dy)) return;
             double d2 = x * x / (t.Sx + allowance) + y * y / (t.Sy + allowance);
             if (d2 >= kPairingGate) return;
             d2 += square(log_of(b.width() / t.w)) / t.Sw + square(log_of(b.height() / t.h)) / t.Sh;

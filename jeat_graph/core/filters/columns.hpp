@@ -15,17 +15,24 @@ template <class Table> void append_rows(Table& table, std::size_t old_rows, std:
     table.columns([&](const char*, auto& column, std::size_t width) { column.resize((old_rows + more) * width); });
 }
 
-// Keep the rows that are marked, in order.
+// Keep the rows that are marked, in order. Rows that follow one another move at once.
 template <class Table> void keep_rows(Table& table, const std::vector<std::uint8_t>& kept) {
+    struct Run {
+        std::size_t from, to, rows;
+    };
+    std::vector<Run> runs;
+    std::size_t rows = 0;
+    for (std::size_t from = 0; from < kept.size(); ++from) {
+        if (!kept[from]) continue;
+        if (runs.empty() || runs.back().from + runs.back().rows != from) runs.push_back({from, rows, 0});
+        ++runs.back().rows;
+        ++rows;
+    }
     table.columns([&](const char*, auto& column, std::size_t width) {
-        std::size_t to = 0;
-        for (std::size_t from = 0; from < kept.size(); ++from) {
-            if (!kept[from]) continue;
-            if (to != from)
-                std::copy(column.begin() + from * width, column.begin() + (from + 1) * width, column.begin() + to * width);
-            ++to;
-        }
-        column.resize(to * width);
+        for (const Run& run : runs)
+            if (run.to != run.from)
+                std::copy_n(column.begin() + run.from * width, run.rows * width, column.begin() + run.to * width);
+        column.resize(rows * width);
     });
 }
 

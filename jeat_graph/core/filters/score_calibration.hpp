@@ -26,8 +26,8 @@ struct RepeatCounts {
             const ByLeft index(now);
             std::vector<association::Pair> pairs;
             for (std::size_t i = 0; i < last_boxes.size(); ++i)
-                index.near(last_boxes[i], [&](std::size_t j) {
-                    const double overlap = intersection_over_union(last_boxes[i], now[j]);
+                index.near(last_boxes[i], [&](std::size_t j, const Sides& box) {
+                    const double overlap = intersection_over_union(last_boxes[i], box);
                     if (overlap >= c.repeat_overlap) pairs.push_back({i, j, overlap});
                 });
             association::Assignment assignment;

@@ -285,9 +285,11 @@ private:
         p_detect_.resize(n);
         q_.resize(boxes_.size());
         of_clutter_.resize(boxes_.size());
+        double least_of_clutter = 1.0;
         for (std::size_t j = 0; j < boxes_.size(); ++j) {
             q_[j] = expit(scan.logits[j] - s_.belief.decision_threshold[k]);
             of_clutter_[j] = association::score_likelihood(c_.clutter_precision, q_[j], c_);
+            least_of_clutter = std::min(least_of_clutter, of_clutter_[j]);
         }
         const association::ScanTerms terms(s_.sensors[k].leftovers, s_.width * s_.height, c_);
         const ByLeft& index = *index_;
@@ -303,13 +305,19 @@ private:
                                    association::kLeastPDetect, association::kMostPDetect);
             const double clutter = terms.log_clutter - log_of(expected.size[0] * expected.size[1]);
             const double real = std::max(tracks.real[i], association::kLeastPosterior);
-            const double start = log_of(p / (1.0 - p)) - clutter, reach = association::reach(expected, 0, c_);
-            const double above = association::reach(expected, 1, c_);
+            const double start = log_of(p / (1.0 - p)) - clutter;
+            // A box that the edge cuts may lie farther off, but is only compared so where the object reaches the edge.
+            const double best = (std::max(real, 1.0 - real) + c_.score_floor) / least_of_clutter;
+            const association::Gates gates = reaches_edge(expected.box)
+                                                 ? association::Gates(c_)
+                                                 : association::Gates(expected, start + log_of(best), terms, c_);
+            const double reach = association::reach(expected, 0, gates, c_), above = association::reach(expected, 1, gates, c_);
             const auto gain_of = [&](std::size_t j) {
                 const auto y = side_innovations(boxes_[j], expected.box);
                 const Edges cut = unmeasured_sides(y, edges_[j]);
-                const double density =
-                    association::sides_log_density(y, cut.any() ? with_cut(expected, cut, c_) : expected, terms, c_);
+                const double density = cut.any()
+                                           ? association::sides_log_density(y, with_cut(expected, cut, c_), terms, c_)
+                                           : association::sides_log_density(y, expected, terms, c_);
                 if (density <= association::kImpossible) return density;
                 const double of_track = association::score_likelihood(real, q_[j], c_);
                 return start + density + log_of(of_track / of_clutter_[j]);
@@ -320,13 +328,18 @@ private:
                 if (j < boxes_.size()) pairs_.push_back({i, j, std::max(gain_of(j), association::kLeastGain)});
                 continue;
             }
-            index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j) {
-                if (std::abs(boxes_[j].top - expected.box.top) > above || is_owned(scan, j)) return;
+            index.with_left_in(expected.box.left - reach, expected.box.left + reach, [&](std::size_t j, const Sides& box) {
+                if (std::abs(box.top - expected.box.top) > above || is_owned(scan, j)) return;
                 const double gain = gain_of(j);
                 if (gain > 0.0) pairs_.push_back({i, j, gain});
             });
         }
         made_ = assignment_.solve(by_appearance(scan), n, boxes_.size(), c_.exact_assignment);
+    }
+
+    bool reaches_edge(const Sides& box) const {
+        return !(box.left > c_.edge_px && box.top > c_.edge_px && box.right < s_.width - c_.edge_px &&
+                 box.bottom < s_.height - c_.edge_px);
     }
 
     // The boxes of a scan by their owners, where these are given.
@@ -348,9 +361,9 @@ private:
         for (std::size_t j = 0; j < boxes_.size(); ++j) {
             may_be_interrupted();
             double overlap = 0.0;
-            index.near(boxes_[j], [&](std::size_t other) {
+            index.near(boxes_[j], [&](std::size_t other, const Sides& box) {
                 if (scan.logits[other] > scan.logits[j])
-                    overlap = std::max(overlap, intersection_over_union(boxes_[j], boxes_[other]));
+                    overlap = std::max(overlap, intersection_over_union(boxes_[j], box));
             });
             const double odds = q_[j] / (1.0 - q_[j]) * (1.0 - overlap);
             confirms_[j] = odds / (1.0 + odds) >= c_.confirming;
@@ -476,12 +489,12 @@ private:
             const std::size_t row = n + f, j = free_[f];
             may_be_interrupted();
             double overlap = 0.0;
-            rivals.near(boxes_[j], [&](std::size_t r) {
-                overlap = std::max(overlap, intersection_over_union(boxes_[j], rivals_[r]));
+            rivals.near(boxes_[j], [&](std::size_t, const Sides& rival) {
+                overlap = std::max(overlap, intersection_over_union(boxes_[j], rival));
             });
-            among.near(boxes_[j], [&](std::size_t g) {
+            among.near(boxes_[j], [&](std::size_t g, const Sides& box) {
                 if (scan.logits[free_[g]] > scan.logits[j])
-                    overlap = std::max(overlap, intersection_over_union(boxes_[j], free_boxes_[g]));
+                    overlap = std::max(overlap, intersection_over_union(boxes_[j], box));
             });
             initial_state(boxes_[j], edges_[j], rho2, exp_of(s_.log_scene_variance()), c_, tracks.mean_of(row), tracks.covariance_of(row));
             with_velocity(tracks.mean_of(row), s_.camera_velocity);
@@ -554,9 +567,9 @@ private:
             if (!compared(i)) continue;
             may_be_interrupted();
             double most = 0.0;
-            index.near(tracks_boxes_[i], [&](std::size_t j) {
+            index.near(tracks_boxes_[i], [&](std::size_t j, const Sides& box) {
                 if (tracks.log_odds[j] > tracks.log_odds[i] && tracks.evidence.detections[j] >= tracks.evidence.detections[i])
-                    most = std::max(most, intersection_over_union(tracks_boxes_[i], tracks_boxes_[j]));
+                    most = std::max(most, intersection_over_union(tracks_boxes_[i], box));
             });
             tracks.evidence.overlap[i] = std::min(tracks.evidence.overlap[i], most);
         }
