@@ -30,7 +30,8 @@ _DATA = {
     "jeat_graph.detection.network_cache": ("jeat_graph/detection/weights", ("*",)),
     "jeat_graph_sehn.simulation.scenario": ("sehn/jeat_graph_sehn/scenarios", ("*.yaml",)),
 }
-#: The compiled package: each folder is a submodule, bound by its `module.cpp`; these files belong to all.
+#: The compiled package: each folder is a submodule, bound by its `module.cpp`; these files belong to all. A header
+#: may have its functions in a source of its name.
 _CORE = "jeat_graph.core"
 _BUILT_BY = ("module.cpp", "CMakeLists.txt")
 _INCLUDED = re.compile(r'^\s*#include "([^"]+)"', re.MULTILINE)
@@ -96,6 +97,7 @@ def _compiled(sources: set[Path]) -> set[Path]:
         if path in found or not path.is_file():
             continue
         found.add(path)
+        waiting.append(path.with_suffix(".cpp"))
         names = _INCLUDED.findall(path.read_text(encoding="utf-8"))
         waiting += [folder / name for name in names for folder in (path.parent, core)]
     return found

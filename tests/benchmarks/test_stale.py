@@ -138,7 +138,7 @@ def test_of_what_is_compiled_the_imported_folders_count_with_their_headers():
     built = {"jeat_graph/core/module.cpp", "jeat_graph/core/CMakeLists.txt"}
     assert built | {"jeat_graph/core/events/evt3.hpp", "jeat_graph/core/events/evt3_block.hpp"} <= events
     assert not [path for path in events if path.startswith("jeat_graph/core/tracking/")]
-    assert built | {"jeat_graph/core/tracking/step.hpp", "jeat_graph/core/filters/singer.hpp"} <= tracker
+    assert built | {"jeat_graph/core/tracking/step.cpp", "jeat_graph/core/filters/singer.hpp"} <= tracker
     assert "jeat_graph/core/events/evt3.hpp" not in tracker
 
 

@@ -13,6 +13,7 @@
 #include "exclusive.hpp"
 #include "signals.hpp"
 #include "smoothers/histories.hpp"
+#include "tracking/life.hpp"
 #include "tracking/state_check.hpp"
 #include "tracking/step.hpp"
 
@@ -185,12 +186,12 @@ public:
         Record* const record = smooths_ ? &record_ : nullptr;
         const bool is_reset = state.started && t - state.t >= kLongestSilenceS;
         record_.begin(t);
-        if (is_reset) record_.is_reset = true, step_.reset(t);
+        if (is_reset) record_.is_reset = true, tracking::reset(now_.state, t);
         for (Scan& scan : scans_)
             if (is_reset) scan.similarity = {nullptr, 0, 0};
         step_.run(t, scans_, is_reset ? nullptr : moved, reported_, record);
         write_answer(t);
-        step_.end_tracks(record);
+        end_tracks(now_.state, record);
     }
 
     // Keep what the last step gave the smoother, for hand_over.
@@ -217,7 +218,7 @@ public:
 
     void reset(double t) {
         check(std::isfinite(t), "no such time");
-        step_.reset(t);
+        tracking::reset(now_.state, t);
         now_.answer = {};
         histories_.end_all(now_.state.gaps, now_.state.constants);
     }

@@ -1,6 +1,6 @@
 // State of the tracker: the tracks in columns, and what is learnt of sensors and scene.
 //
-// Behind each part stands the stage of step.hpp that writes it.
+// Behind each part stands the stage that writes it; step.cpp has them in their order.
 #pragma once
 
 #include <algorithm>
@@ -45,7 +45,11 @@ struct Tracks {
 
     std::size_t size() const { return track_id.size(); }
     double* mean_of(std::size_t row) { return mean.data() + row * kMean; }
+    const double* mean_of(std::size_t row) const { return mean.data() + row * kMean; }
     double* covariance_of(std::size_t row) { return covariance.data() + row * kCovariance; }
+    const double* covariance_of(std::size_t row) const { return covariance.data() + row * kCovariance; }
+    double* presence_of(std::size_t row) { return presence.data() + row * kPresences; }
+    const double* presence_of(std::size_t row) const { return presence.data() + row * kPresences; }
 
     template <class Visit> void own_columns(Visit visit) {
         const std::size_t S = evidence.sensors;
