@@ -3,7 +3,7 @@
 A link's gain is ln of the ratio of two stories: head continues tail after a gap of length u, or tail leaves
 and head is born,
 
-    ln p(joined)/p(apart) + votes + ln f(u) − ln λ/α − ln p_exit
+    ln p(joined)/p(apart) + votes + ln f(u) − ln λ/α − ln p_exit + likeness
 
 λ is the rate of births (a time step) and p_exit the probability that a piece's object leaves, each apart for
 the picture's interior and its rim, α the share of the picture; f is the density of gaps, most of them none,
@@ -34,8 +34,8 @@ _AT_ENDS = 2.5
 #: Nats of a link that all passes have made.
 VOTES = 3.0
 #: What a link's gain is made up of: how well the motions fit, the passes that made it, the length of the gap,
-#: that the second piece is not born, and that the object of the first does not leave.
-TERMS = ("motion", "passes", "gap length", "no birth", "no exit")
+#: that the second piece is not born, that the object of the first does not leave, and that both look alike.
+TERMS = ("motion", "passes", "gap length", "no birth", "no exit", "appearance")
 
 
 class Pieces(NamedTuple):
@@ -78,7 +78,7 @@ class Joined(NamedTuple):
     Attributes:
         links: all possible links with their gains.
         cover: (P,) the link that continues each piece in the best cover, -1 for none.
-        terms: (E, 5) what the gains are the sums of, in the order of `TERMS`.
+        terms: (E, 6) what the gains are the sums of, in the order of `TERMS`.
     """
 
     links: Links
@@ -93,6 +93,7 @@ def join(
     span: tuple[float, float],
     step_s: float,
     past: Past | None = None,
+    likeness: FloatArray | None = None,
 ) -> Joined:
     """Find the best cover of pieces.
 
@@ -103,6 +104,7 @@ def join(
         span: first and last time of the recording (s).
         step_s: time from one look to the next (s).
         past: what was decided before, of other pieces.
+        likeness: (E,) ln of the ratio that looks give each; None where nothing is known of looks.
     """
     before = Past.none() if past is None else past
     u = pieces.begins[possible.head] - pieces.ends[possible.tail]
@@ -114,6 +116,8 @@ def join(
     cover = np.full(len(pieces.begins), -1, dtype=np.int64)
     links, terms = possible, np.zeros((len(u), len(TERMS)))
     terms[:, 0], terms[:, 1] = possible.gain, VOTES * votes
+    if likeness is not None:
+        terms[:, 5] = likeness
     for _ in range(_ROUNDS):
         terms[:, 2] = np.log(gap_density(u, median, step_s))
         terms[:, 3] = -np.log(births / _AREA)[born[possible.head]]

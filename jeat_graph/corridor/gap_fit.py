@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from jeat_graph.association.appearance import learn_appearance
 from jeat_graph.association.matching_marginals import MatchingMarginals, matching_marginals
-from jeat_graph.corridor.appearance import learn_appearance
 from jeat_graph.corridor.gap_model import (
     Gap,
     GapParameters,

@@ -28,7 +28,7 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import gaussian_kde
 
-from jeat_graph.corridor.appearance import AppearanceModel, centred
+from jeat_graph.association.appearance import AppearanceModel, centred
 from jeat_graph.corridor.passages import Passages
 from jeat_graph.data.arrays import FloatArray, IntArray
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jeat_graph.association.linking import TERMS
 from jeat_graph.data.arrays import FloatArray, IntArray
 
 
@@ -18,7 +19,7 @@ class IdentityLinks(NamedTuple):
         t_tail, t_head: their times (s).
         log_ratio: ln of how much likelier the two belong together than apart.
         probability: that they do.
-        terms: (K, 5) what `log_ratio` is the sum of, in the order of `association.linking.TERMS`.
+        terms: (K, 6) what `log_ratio` is the sum of, in the order of `association.linking.TERMS`.
     """
 
     track_id: IntArray
@@ -29,6 +30,11 @@ class IdentityLinks(NamedTuple):
     log_ratio: FloatArray
     probability: FloatArray
     terms: FloatArray
+
+    def told_terms(self) -> dict[str, FloatArray]:
+        """Return the terms (K,) by name; that of appearance only where it tells something."""
+        *usual, appearance = zip(TERMS, self.terms.T, strict=True)
+        return dict([*usual, appearance] if appearance[1].any() else usual)
 
     def between_tracks(self) -> IdentityLinks:
         """Return the links that join two causal tracks, without those that leave one as it was."""

@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip("jeat_graph_sehn")
 
+from jeat_graph.association.appearance import centred, learn_appearance
 from jeat_graph.cli.main import main
-from jeat_graph.corridor.appearance import centred, learn_appearance
 from jeat_graph.corridor.gap_model import Gap
 from jeat_graph.corridor.handover import KnownGap, solve
 from jeat_graph.corridor.passage_appearance import check_appearance, track_appearance, with_appearance

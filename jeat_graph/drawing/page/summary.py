@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from jeat_graph.association.linking import TERMS
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.diagnostics import NIS_FREEDOM
 from jeat_graph.data.trajectories import Trajectories
@@ -129,6 +128,7 @@ def link_table(data: RunData) -> Table | None:
     if data.links is None:
         return None
     links = data.links.between_tracks()
+    terms = links.told_terms()
     records: list[dict[str, Cell]] = [
         {
             "identity": int(links.track_id[k]),
@@ -139,11 +139,11 @@ def link_table(data: RunData) -> Table | None:
             "gap (s)": float(links.t_head[k] - links.t_tail[k]),
             "probability": float(links.probability[k]),
             "log ratio": float(links.log_ratio[k]),
-            **{name: float(value) for name, value in zip(TERMS, links.terms[k], strict=True)},
+            **{name: float(values[k]) for name, values in terms.items()},
         }
         for k in range(len(links.tail))
     ]
-    digits = {"probability": 2} | dict.fromkeys(("log ratio", *TERMS), 1)
+    digits = {"probability": 2} | dict.fromkeys(("log ratio", *terms), 1)
     return Table.from_records(records, title="Causal tracks that were joined", digits=digits)
 
 

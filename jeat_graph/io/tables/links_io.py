@@ -13,8 +13,13 @@ from jeat_graph.io.tables.file_tables import read_table
 from jeat_graph.io.tables.rounding import round_decimals
 from jeat_graph.io.tables.table_writer import write_columns
 
-_TERM_COLUMNS = tuple(name.replace(" ", "_") for name in TERMS)
-#: Columns of the file.
+
+def _column(term: str) -> str:
+    return term.replace(" ", "_")
+
+
+*_TERM_COLUMNS, _APPEARANCE = map(_column, TERMS)
+#: Columns of each file; that of appearance may follow.
 LINK_COLUMNS = (
     "from",
     "to",
@@ -41,8 +46,8 @@ def write_links(links: IdentityLinks, path: str | Path) -> None:
         "t_from": links.t_tail + 0.0,
         "t_to": links.t_head + 0.0,
     }
-    for name, values in zip(_TERM_COLUMNS, links.terms.T, strict=True):
-        columns[name] = round_decimals(values, _DECIMALS)
+    for name, values in links.told_terms().items():
+        columns[_column(name)] = round_decimals(values, _DECIMALS)
     write_columns(columns, path)
 
 
@@ -52,10 +57,11 @@ def read_links(path: str | Path) -> IdentityLinks:
     Raises:
         DataError: the file cannot be read, or lacks a column.
     """
-    table = read_table(path, LINK_COLUMNS)
+    table = read_table(path, LINK_COLUMNS, (_APPEARANCE,))
     whole = {name: table.whole(name) for name in ("track_id", "from", "to")}
     real = {name: table.number(name) for name in LINK_COLUMNS if name not in whole}
-    terms = np.stack([real[name] for name in _TERM_COLUMNS], axis=1)
+    appearance = table.number(_APPEARANCE) if _APPEARANCE in table else np.zeros(len(table))
+    terms = np.stack([*(real[name] for name in _TERM_COLUMNS), appearance], axis=1)
     return IdentityLinks(
         *(whole["track_id"], whole["from"], whole["to"], real["t_from"], real["t_to"]),
         *(real["log_ratio"], real["probability"], terms),

@@ -14,9 +14,11 @@ from jeat_graph.association import agreement
 from jeat_graph.association.linking import TERMS, Joined, Past, Pieces, join
 from jeat_graph.association.path_cover import Links, chains, preferring, sampled_covers, shares
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.joining import LearntScene, MeasuredBoxes, beginnings_of, ends_of, log_ratio
 from jeat_graph.tracking.identities.passes import Pass
+from jeat_graph.tracking.identities.piece_appearance import learnt_likeness, link_cosines
 
 #: Share of the passes that make a link, from which on it stands.
 AGREED = 0.8
@@ -68,11 +70,13 @@ class Recording(NamedTuple):
         measured: the detections.
         scan_t: (T,) all times of scans (s).
         scene: what was learnt of the scene.
+        embeddings: (N, V) what each looks like, NaN where that is not known; None where none has any.
     """
 
     measured: MeasuredBoxes
     scan_t: FloatArray
     scene: LearntScene
+    embeddings: EmbeddingArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +90,7 @@ class IdentityDecision:
         tail, head: (K,) detections that the cover joins.
         log_ratio: (K,) ln p(joined)/p(apart).
         joined: (K,) probability.
-        terms: (K, 5) what `log_ratio` is the sum of, in the order of `linking.TERMS`.
+        terms: (K, 6) what `log_ratio` is the sum of, in the order of `linking.TERMS`.
     """
 
     owner: IntArray
@@ -224,7 +228,14 @@ def _joined(
     links, causal = links.where(possible), causal[possible]
     voted = agreement.votes_between(piece, assigned, first)
     votes = _of_pairs(links, *voted, len(members)) / len(assigned)
-    found = join(pieces, links, votes, span, step, past)
+    likeness = None
+    if recording.embeddings is not None:
+        # By links that neither looks nor the passes decide, which weighed looks, too.
+        plain = join(pieces, links, np.zeros(len(votes)), span, step, past)
+        ends = (_columns(members, from_end=True), _columns(members, from_end=False))
+        cosine = link_cosines(recording.embeddings, seen.sensor, *ends, links)
+        likeness = learnt_likeness(cosine, _drawn(plain.links, plain.cover)[1])
+    found = join(pieces, links, votes, span, step, past, likeness)
     return found, _only_links(links, causal, len(members))
 
 

@@ -72,7 +72,7 @@ def _recording(tracker: ModelTracker, detections: Detections) -> Recording:
     )
     t = np.repeat(detections.scan_t, count)
     measured, scene = measured_boxes(tracker, t, sensor, boxes)
-    return Recording(measured, np.unique(detections.scan_t), scene)
+    return Recording(measured, np.unique(detections.scan_t), scene, detections.embeddings)
 
 
 def measured_boxes(

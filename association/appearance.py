@@ -1,4 +1,4 @@
-"""What it says that two passages look alike: learnt from pairs that times, lanes and lengths decide.
+"""What it says that two tracks look alike: learnt from pairs that are decided by all but their looks.
 
 The feature of a pair is the cosine x of the two embeddings, each less the mean of its camera's, so that what
 a camera does to all vehicles counts for nothing. Of one vehicle x has mean μ₁ and variance v₁, of two μ₀ and
@@ -24,11 +24,11 @@ from jeat_graph.data.arrays import FloatArray
 #: The least variance of a cosine.
 _LEAST_VARIANCE = 1e-6
 #: ln of the greatest ratio that looks give a pair: as the tracker has it.
-_MOST_RATIO = 6.0
+MOST_RATIO = 6.0
 
 
 class AppearanceModel(NamedTuple):
-    """How alike one vehicle looks at both cameras, and how alike two vehicles look.
+    """How alike one vehicle looks twice, at two cameras or at one, and how alike two vehicles look.
 
     Attributes:
         same, other: mean cosine of one vehicle and of two.
@@ -48,7 +48,7 @@ class AppearanceModel(NamedTuple):
         """Return ln of the likelihood ratio (E,) of "one vehicle" to "two", 0 where the cosine is NaN."""
         slope = (self.same - self.other) / self.sigma**2
         found = slope * (cosine - 0.5 * (self.same + self.other))
-        return np.where(np.isfinite(cosine), np.clip(found, -_MOST_RATIO, _MOST_RATIO), 0.0)
+        return np.where(np.isfinite(cosine), np.clip(found, -MOST_RATIO, MOST_RATIO), 0.0)
 
 
 def learn_appearance(cosine: FloatArray, probability: FloatArray) -> AppearanceModel | None:
