@@ -16,6 +16,7 @@ from jeat_graph.eval.samples import (
     WholeTrack,
     by_availability,
     by_distance,
+    by_height,
     collect_samples,
     errors_of,
     lag_name,
@@ -33,6 +34,7 @@ _CONSISTENCY = 0.3
 _WHOLE = "whole track"
 # The same by GTSAM, as `smoother.engine` calls it.
 _GTSAM = "gtsam-full"
+_UNITS = "px, px/s, px/s²"
 # What can be said of an estimator by true places alone.
 _OF_PLACES = ("estimator", "position", "position/filter", "ANEES position")
 
@@ -90,24 +92,33 @@ def compare(
         truth = with_centres(truth, image)
         with progress_span(_CONSISTENCY, 1.0):
             others = _by_gtsam() if gtsam else None
-            samples = collect_samples(tracks, truth, causal, lags, instants=instants, others=others)
+            everything = collect_samples(tracks, truth, causal, lags, instants=instants, others=others)
+        samples = everything.uncut()
         if len(samples):
             errors = {name: errors_of(samples, name) for name in samples.states}
             values["errors"] = errors
             values["lag_curve"] = [{"lag_s": lag, **errors[lag_name(lag)]} for lag in lags]
             values["by_availability"] = _by_group(samples, by_availability(samples, sensors))
             tables.insert(0, _error_table(errors, samples.has_motion))
-            tables.append(
-                _group_table(
-                    values["by_availability"],
-                    f"By the sensors that detected the track in the last {RECENT_S:g} s",
-                    samples.has_motion,
-                )
-            )
-            if samples.distance is not None:
-                values["by_distance"] = _by_group(samples, by_distance(samples.distance))
-                tables.append(_group_table(values["by_distance"], "By distance", samples.has_motion))
+            by_sensors = f"By the sensors that detected the track in the last {RECENT_S:g} s"
+            tables.append(_group_table(values["by_availability"], by_sensors, samples.has_motion))
+            _add_near_and_far(values, tables, samples, everything)
     return Comparison(values, tables, samples, lags)
+
+
+def _add_near_and_far(
+    values: dict[str, Any], tables: list[Table], uncut: Samples, everything: Samples
+) -> None:
+    """Add errors by distance, or by height where no distance is known: of uncut objects, and of all."""
+    for samples, suffix, who in ((uncut, "", "uncut objects"), (everything, "_all", "all objects")):
+        if suffix and not everything.cut.any():
+            continue
+        groups, key = by_distance(samples), "by_distance"
+        if groups is None:
+            groups, key = by_height(samples), "by_height"
+        values[key + suffix] = _by_group(samples, groups)
+        title = f"{key.replace('_', ' ').capitalize()}, {who}"
+        tables.append(_group_table(values[key + suffix], title, samples.has_motion))
 
 
 def _by_gtsam() -> dict[str, WholeTrack]:
@@ -145,7 +156,7 @@ def _error_table(errors: dict[str, dict[str, float]], motion: bool) -> Table:
         }
         records.append(record if motion else {key: record[key] for key in _OF_PLACES})
     bounds = f"{base['anees_low']:.3f} to {base['anees_high']:.3f}"
-    units = "px, px/s, px/s²" if motion else "px"
+    units = _UNITS if motion else "px"
     return Table.from_records(
         records,
         title=f"RMSE ({units}) at {int(base['count'])} instants; ANEES should be 1 (95 %: {bounds})",
@@ -153,14 +164,16 @@ def _error_table(errors: dict[str, dict[str, float]], motion: bool) -> Table:
 
 
 def _group_table(groups: Sequence[dict[str, Any]], title: str, motion: bool) -> Table:
+    kinds = ("position", "velocity", "acceleration") if motion else ("position",)
     records: list[dict[str, Cell]] = []
     for one in groups:
-        record: dict[str, Cell] = {"group": one["group"], "instants": int(one["filter"]["count"])}
-        kinds = ("position", "velocity") if motion else ("position",)
-        columns = [(part, f"{part}_rmse") for part in kinds]
-        columns += [(f"ANEES {part}", f"anees_{part}") for part in kinds]
-        for label, key in columns:
-            record[f"{label}, filter"] = one["filter"][key]
-            record[f"{label}, {_WHOLE}"] = one["full"][key]
-        records.append(record)
-    return Table.from_records(records, title=f"{title} (RMSE in px{', px/s' if motion else ''})")
+        for name, label in (("filter", "filter"), ("full", _WHOLE)):
+            record: dict[str, Cell] = {
+                "group": one["group"],
+                "instants": int(one[name]["count"]),
+                "estimator": label,
+            }
+            record |= {part: one[name][f"{part}_rmse"] for part in kinds}
+            record |= {f"ANEES {part}": one[name][f"anees_{part}"] for part in kinds}
+            records.append(record)
+    return Table.from_records(records, title=f"{title} (RMSE in {_UNITS if motion else 'px'})")

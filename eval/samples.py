@@ -12,7 +12,6 @@ import numpy as np
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.progress import with_progress
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
-from jeat_graph.eval.breakdown import DISTANCE_BINS_M
 from jeat_graph.eval.consistency import PARTS, chi2_bounds
 from jeat_graph.eval.frames import build_frames
 from jeat_graph.eval.kinematics import matched_errors
@@ -23,6 +22,9 @@ from jeat_graph.smoothers.filtered_track import FilteredTrack
 RECENT_S = 0.1
 #: A true box this near to an edge of the picture (px) is taken to be cut by it.
 EDGE_PX = 1.0
+# Between them errors are shown: near ones are finer, because motion in the picture goes as 1 / distance².
+_DISTANCES_M = (0.0, 20.0, 30.0, 60.0, 100.0, np.inf)
+_HEIGHTS_PX = (0.0, 25.0, 50.0, 100.0, 200.0, np.inf)
 # A time of the truth further from the last scan than this is not judged (s).
 _FURTHEST_S = 0.05
 
@@ -41,6 +43,8 @@ class Samples:
         truth: (N, 2, 3) true [p, v, a] per axis.
         states: estimates (N) by estimator.
         available: (N,) bit k is set where sensor k had lately given the track a detection.
+        cut: (N,) whether the picture's edge cuts the true box.
+        height: (N,) of the true box (px).
         distance: (N,) from the camera (m), or None.
     """
 
@@ -49,6 +53,8 @@ class Samples:
     truth: FloatArray
     states: dict[str, States]
     available: IntArray
+    cut: BoolArray
+    height: FloatArray
     distance: FloatArray | None
 
     @property
@@ -58,6 +64,20 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def uncut(self) -> Samples:
+        """Return those of objects that lie whole within the picture."""
+        keep = ~self.cut
+        return Samples(
+            t=self.t[keep],
+            track_id=self.track_id[keep],
+            truth=self.truth[keep],
+            states={name: States(one.mean[keep], one.cov[keep]) for name, one in self.states.items()},
+            available=self.available[keep],
+            cut=self.cut[keep],
+            height=self.height[keep],
+            distance=None if self.distance is None else self.distance[keep],
+        )
 
 
 def lag_name(lag_s: float) -> str:
@@ -106,7 +126,8 @@ def collect_samples(
         iou: smallest IoU of a match.
         others: more smoothers of whole tracks, by what they are called.
 
-    Objects cut off by the picture's edge are left out: a detector sees the centre of what is left of them.
+    Of objects that the picture's edge cuts a detector sees the centre of what is left: they are marked as
+    `cut`, and left out where the truth does not say where the whole of them is.
     """
     frames = build_frames(truth, causal, kind="causal", instants=instants)
     matched = matched_errors(frames, iou=iou)
@@ -114,8 +135,7 @@ def collect_samples(
     assert truth.motion is not None
     entry, row = matched.track_entry, frames.truth_row[matched.truth_entry]
     known = np.isfinite(truth.motion[frames.truth_row[matched.truth_entry], :2]).all(axis=1)
-    whole = ~matched.truncated & known
-    identity, row = frames.tracks.track_id[entry][whole], row[whole]
+    identity, row, cut = frames.tracks.track_id[entry][known], row[known], matched.truncated[known]
     t = truth.t[row]
     more = {} if others is None else others
     names = ["filter", *(lag_name(lag) for lag in lags_s), "full", *more]
@@ -143,6 +163,8 @@ def collect_samples(
         truth=truth.motion[rows].reshape(-1, 3, 2).transpose(0, 2, 1),
         states=states,
         available=np.concatenate([part[1] for part in parts]) if parts else order,
+        cut=cut[order],
+        height=truth.boxes[rows, 3],
         distance=None if truth.distance is None else truth.distance[rows],
     )
 
@@ -187,10 +209,19 @@ def by_availability(samples: Samples, sensors: Sequence[str]) -> dict[str, BoolA
     return groups
 
 
-def by_distance(distance: FloatArray) -> dict[str, BoolArray]:
-    """Samples (N,) by their distance from the camera (m)."""
+def by_distance(samples: Samples) -> dict[str, BoolArray] | None:
+    """Samples (N,) by their distance from the camera (m); None where the truth does not tell it."""
+    return None if samples.distance is None else _in_bins(samples.distance, _DISTANCES_M, "m")
+
+
+def by_height(samples: Samples) -> dict[str, BoolArray]:
+    """Samples (N,) by the height of the true box (px)."""
+    return _in_bins(samples.height, _HEIGHTS_PX, "px")
+
+
+def _in_bins(value: FloatArray, edges: Sequence[float], unit: str) -> dict[str, BoolArray]:
     groups = {}
-    for low, high in pairwise(DISTANCE_BINS_M):
-        label = f"{low:g}–{high:g} m" if np.isfinite(high) else f"over {low:g} m"
-        groups[label] = (distance >= low) & (distance < high)
+    for low, high in pairwise(edges):
+        label = f"{low:g}–{high:g} {unit}" if np.isfinite(high) else f"over {low:g} {unit}"
+        groups[label] = (value >= low) & (value < high)
     return groups

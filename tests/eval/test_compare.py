@@ -134,7 +134,70 @@ def test_instants_are_grouped_by_the_sensors_that_saw_the_track_and_by_distance(
     # At birth only sensor b has seen the track; from the first measurement (sensor a) on both have.
     assert by_sensor == {"a + b": total - 30, "b only": 30}
     by_distance = {one["group"]: one["filter"]["count"] for one in matched_model.values["by_distance"]}
-    assert by_distance == {"0–30 m": total / 2, "30–60 m": total / 2}
+    assert by_distance == {"20–30 m": total / 2, "30–60 m": total / 2}
+
+
+def expected_by_class(tracks, truth, rows, labels):
+    """Count, RMSE and ANEES of [p, v, a] of filter and smoother by class, object by object in plain loops."""
+    errors = {}
+    for row in rows:
+        one, label = (some[truth.object_id[row] - 1] for some in (tracks, labels))
+        k = int(np.flatnonzero(one.t == truth.t[row])[0])
+        for name, (mean, cov) in {"filter": (one.mean, one.covariance), "full": one.smoothed()}.items():
+            error = mean[k] - truth.motion[row].reshape(3, 2).T
+            spread = [[cov[k, axis, part, part] for part in range(3)] for axis in range(2)]
+            errors.setdefault((label, name), []).append((error**2, error**2 / spread))
+    return {
+        key: (len(found), np.sqrt(squares.sum(axis=1).mean(axis=0)), ratios.mean(axis=(0, 1)))
+        for key, found in errors.items()
+        for squares, ratios in [np.swapaxes(np.array(found), 0, 1)]
+    }
+
+
+def cut_by_the_edge(truth):
+    """The truth, with boxes of every fifth row that lost 10 px on one side, and heights by object."""
+    boxes = truth.boxes.copy()
+    boxes[:, 1] += 50.0 - 10.0 * truth.object_id
+    boxes[:, 3] = 20.0 * truth.object_id
+    boxes[::5, 2] -= 10.0
+    return replace(truth, boxes=boxes)
+
+
+@pytest.mark.parametrize("by", ["distance", "height"])
+def test_errors_by_class_are_those_of_its_objects_uncut_and_all(by):
+    tracks, truth, table = many(count=6)
+    truth = cut_by_the_edge(truth)
+    far = np.array([10.0, 20.0, 59.9, 60.0, 99.0, 100.0])[truth.object_id - 1]
+    truth = replace(truth, distance=far if by == "distance" else None)
+    table = replace(table, boxes=truth.boxes)
+    comparison = compare(tracks, ("a", "b"), truth=truth, causal=table, lags_s=(0.0,))
+    labels = {
+        "distance": ["0–20 m", "20–30 m", "30–60 m", "60–100 m", "60–100 m", "over 100 m"],
+        # 20, 40, … px high.
+        "height": ["0–25 px", "25–50 px", "50–100 px", "50–100 px", "100–200 px", "100–200 px"],
+    }[by]
+    cut = np.arange(len(truth)) % 5 == 0
+    for key, rows in ((f"by_{by}", np.flatnonzero(~cut)), (f"by_{by}_all", np.arange(len(truth)))):
+        expected = expected_by_class(tracks, truth, rows, labels)
+        found = {
+            (one["group"], name): one[name] for one in comparison.values[key] for name in ("filter", "full")
+        }
+        assert found.keys() == expected.keys()
+        for group, (count, rmse, anees) in expected.items():
+            one = found[group]
+            assert one["count"] == count
+            parts = ("position", "velocity", "acceleration")
+            assert [one[f"{part}_rmse"] for part in parts] == pytest.approx(rmse)
+            assert [one[f"anees_{part}"] for part in parts] == pytest.approx(anees)
+    assert comparison.values["errors"]["filter"]["count"] == (~cut).sum()
+    shown = "\n".join(table.render() for table in comparison.tables)
+    assert f"By {by}, uncut objects" in shown
+    assert f"By {by}, all objects" in shown
+
+
+def test_where_nothing_is_cut_all_objects_are_not_shown_again(matched_model):
+    assert "by_distance_all" not in matched_model.values
+    assert not any("all objects" in table.render() for table in matched_model.tables)
 
 
 def test_measurements_noisier_than_claimed_show_in_nis_and_nees():
