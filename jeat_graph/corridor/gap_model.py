@@ -109,6 +109,7 @@ class Gap:
         traffic_after: (B,) the same.
         apart_variance: of ln speeds less those of the traffic at B, of vehicles that have nothing to do with
             each other; NaN takes that of those at B.
+        known_appearance: what `appearance` returns, where it does not follow from these passages alone.
     """
 
     before: Passages
@@ -116,6 +117,7 @@ class Gap:
     traffic_before: FloatArray
     traffic_after: FloatArray
     apart_variance: float = math.nan
+    known_appearance: tuple[FloatArray, FloatArray] | None = None
 
     @classmethod
     def of(cls, before: Passages, after: Passages) -> Gap:
@@ -137,6 +139,8 @@ class Gap:
     @cached_property
     def appearance(self) -> tuple[FloatArray, FloatArray] | None:
         """Embeddings (A, E) and (B, E) less their camera's mean, of unit length; None if a side has none."""
+        if self.known_appearance is not None:
+            return self.known_appearance
         before, after = self.before.appearance, self.after.appearance
         return None if before is None or after is None else (centred(before), centred(after))
 

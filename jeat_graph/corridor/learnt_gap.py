@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from jeat_graph.association.appearance import AppearanceModel
 from jeat_graph.corridor.gap_model import GapParameters
 from jeat_graph.corridor.handover import Handover
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.embeddings import MOST_NUMBERS
 from jeat_graph.data.errors import DataError
 
 #: Least standard deviation (of ln travel time) and usual correlation time (s) of the slowness that all
@@ -45,6 +47,7 @@ class LearntGap:
         own_variance: of ln speed less that of the traffic, at the second camera.
         lanes: names of the lanes at both cameras, as `parameters.lanes` has them.
         kinds: names of the classes likewise.
+        numbers: of an embedding, if `parameters.appearance` says what they tell; else 0.
     """
 
     first: str
@@ -58,6 +61,7 @@ class LearntGap:
     own_variance: float
     lanes: Names
     kinds: Names
+    numbers: int = 0
 
 
 def model_tree(over: Handover) -> dict[str, Any]:
@@ -76,6 +80,11 @@ def model_tree(over: Handover) -> dict[str, Any]:
         "new_share": _short(min(p.rate * span / max(len(b), 1), 1.0)),
         "own_variance": _short(max(float(fitted.gap.own_after.var()), 1e-6)),
     }
+    if p.appearance is not None and a.appearance is not None:
+        tree["appearance"] = {
+            **{name: _short(value) for name, value in p.appearance._asdict().items()},
+            "numbers": a.appearance.shape[1],
+        }
     for name, table, sides in (
         ("lane_ratios", p.lanes, (a.lanes, b.lanes)),
         ("class_ratios", p.kinds, (a.kinds, b.kinds)),
@@ -105,6 +114,7 @@ def learnt_gap(tree: Mapping[str, Any], path: str | Path) -> LearntGap:
         variance = float(tree["covariance"][0][0])
         lanes, lane_names = _table(model.get("lane_ratios"))
         kinds, kind_names = _table(model.get("class_ratios"))
+        appearance, count = _appearance(model.get("appearance"))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise DataError(f"{name}: its model has no valid {error}", path) from None
     tables = [table for table in (lanes, kinds) if table is not None]
@@ -119,7 +129,7 @@ def learnt_gap(tree: Mapping[str, Any], path: str | Path) -> LearntGap:
         weights=weights,
         lanes=lanes,
         kinds=kinds,
-        appearance=None,  # vehicles that are followed while they drive have none
+        appearance=appearance,
         **{key: numbers[key] for key in _PARAMETERS},
     )
     even = numbers["slowness_sd"] < _LEAST_SLOWNESS_SD
@@ -135,7 +145,19 @@ def learnt_gap(tree: Mapping[str, Any], path: str | Path) -> LearntGap:
         numbers["own_variance"],
         lane_names,
         kind_names,
+        count,
     )
+
+
+def _appearance(tree: Any) -> tuple[AppearanceModel | None, int]:
+    """Return what embeddings tell, and how many numbers each has; None and 0 where nothing was learnt."""
+    if tree is None:
+        return None, 0
+    model = AppearanceModel(*(float(tree[name]) for name in AppearanceModel._fields))
+    count = int(tree["numbers"])
+    if not (all(map(math.isfinite, model)) and model.sigma > 0.0 and 1 <= count <= MOST_NUMBERS):
+        raise ValueError("appearance")
+    return model, count
 
 
 def _table(tree: Any) -> tuple[FloatArray | None, Names]:

@@ -236,7 +236,7 @@ class LiveCorridor:
                 {"from": first, "to": last, "vehicles": count}
                 for (first, last), count in sorted(self.od.items())
             ],
-            "problems": [text for k in range(len(self._gaps)) if (text := self._problem(k))],
+            "problems": [text for k in range(len(self._gaps)) for text in self._problems(k)],
         }
 
     def _gap_shown(self, k: int) -> dict[str, Any]:
@@ -247,6 +247,7 @@ class LiveCorridor:
         followed = [one for one in recent if not math.isnan(one[1])]
         expected = sum(one[3] for one in recent)
         mean = self._mean(k, [one[1] for one in followed], [one[2] for one in followed], expected)
+        appearance = gap.learnt.parameters.appearance if gap.compares_appearance else None
         return {
             "from": self.order[k],
             "to": self.order[k + 1],
@@ -254,20 +255,27 @@ class LiveCorridor:
             "followed": self.followed[self.order[k], self.order[k + 1]],
             "followed_share": sum(times.judged) / len(times.judged) if times.judged else None,
             "learnt_share": 1.0 - gap.learnt.new_share,
+            "d_prime": None if appearance is None else round(appearance.d_prime, 2),
             "slowness": round(gap.slowness_now - gap.learnt.slowness, 4),
             "vehicles": len(followed),
             **mean,
         }
 
-    def _problem(self, k: int) -> str:
-        judged, learnt = self._times[k].judged, 1.0 - self._gaps[k].learnt.new_share
-        if len(judged) < _JUDGED or sum(judged) >= _LEAST_PART * learnt * len(judged):
-            return ""
-        return (
-            f"{self.order[k]}-{self.order[k + 1]}: {sum(judged):.0f} of the last {len(judged)} vehicles at "
-            f"{self.order[k + 1]} are followed, where {100.0 * learnt:.0f} % came this way when learnt: "
-            "do the clocks still agree?"
-        )
+    def _problems(self, k: int) -> list[str]:
+        gap, judged = self._gaps[k], self._times[k].judged
+        name, learnt, found = f"{self.order[k]}-{self.order[k + 1]}", 1.0 - gap.learnt.new_share, []
+        if len(judged) == _JUDGED and sum(judged) < _LEAST_PART * learnt * len(judged):
+            found.append(
+                f"{name}: {sum(judged):.0f} of the last {len(judged)} vehicles at {self.order[k + 1]} are "
+                f"followed, where {100.0 * learnt:.0f} % came this way when learnt: "
+                "do the clocks still agree?"
+            )
+        if gap.other_numbers:
+            found.append(
+                f"{name}: embeddings of {gap.other_numbers} numbers come, and those learnt have "
+                f"{gap.learnt.numbers}: they are not compared; use the embedder that `handover` was given"
+            )
+        return found
 
     def state(self) -> dict[str, Any]:
         """Return what `set_state` takes: plain data."""

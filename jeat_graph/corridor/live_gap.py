@@ -26,6 +26,7 @@ from jeat_graph.corridor.gap_model import (
     traffic_speed,
 )
 from jeat_graph.corridor.learnt_gap import LearntGap
+from jeat_graph.corridor.live_appearance import CameraAppearance
 from jeat_graph.corridor.passages import Passages
 from jeat_graph.corridor.shared_slowness import pooled, smoothed
 from jeat_graph.data.arrays import FloatArray, IntArray
@@ -61,6 +62,7 @@ class LivePassage(NamedTuple):
         sigma_speed: its standard deviation.
         lane: name, or empty.
         kind: class, or empty.
+        appearance: its embedding (`data.embeddings.packed_embedding`), or empty.
     """
 
     track_id: int
@@ -70,6 +72,7 @@ class LivePassage(NamedTuple):
     sigma_speed: float
     lane: str = ""
     kind: str = ""
+    appearance: str = ""
 
 
 class Traveller(NamedTuple):
@@ -143,14 +146,27 @@ class LiveGap:
         self._waiting: list[LivePassage] = []
         self._known: list[tuple[LivePassage, LivePassage, float]] = []
         self._came: list[float] = []
+        self._appearance = CameraAppearance(learnt.numbers), CameraAppearance(learnt.numbers)
+
+    @property
+    def compares_appearance(self) -> bool:
+        """Whether embeddings count: something was learnt of them, and enough have come at both cameras."""
+        return all(one.known for one in self._appearance)
+
+    @property
+    def other_numbers(self) -> int:
+        """Numbers of an embedding that has come and cannot be compared with those learnt; 0 if none has."""
+        return max(one.other_numbers for one in self._appearance)
 
     def leave(self, traveller: Traveller) -> None:
         """Take in a vehicle that has passed the first camera."""
+        self._appearance[0].add(traveller.passage.appearance)
         self.on_way.append(traveller)
         self.on_way.sort(key=lambda one: one.passage.t)
 
     def arrive(self, passage: LivePassage) -> None:
         """Take in a vehicle at the second camera."""
+        self._appearance[1].add(passage.appearance)
         self._waiting.append(passage)
         self._waiting.sort(key=lambda one: one.t)
         self._came.append(passage.t)
@@ -214,7 +230,8 @@ class LiveGap:
             sure = 0.0 if k is None else float(probability[k])
             if traveller is not None:
                 taken.add(int(pairs.i[k]))
-                self._known.append((traveller.passage, passage, sure))
+                before, after = (one._replace(appearance="") for one in (traveller.passage, passage))
+                self._known.append((before, after, sure))
             arrived.append(Arrived(passage, traveller, sure, min(float(from_first[j]), 1.0)))
         self.on_way = [one for i, one in enumerate(self.on_way) if i not in taken]
         self._waiting = [one for j, one in enumerate(self._waiting) if not due[j]]
@@ -227,11 +244,13 @@ class LiveGap:
         self._came = [t for t in self._came if t >= second_now - _FLOW_S]
 
     def _parameters(self, second_now: float) -> GapParameters:
-        """Return the parameters, with the rate of arrivals from elsewhere in the traffic of now."""
+        """Return the parameters of now: the rate of arrivals from elsewhere, and whether looks count."""
         recent = [t for t in self._came if t >= second_now - _FLOW_S]
         span = min(second_now - min(recent, default=second_now), _FLOW_S)
         flow = (len(recent) + 1.0) / (span + _FLOW_BEGIN_S)
-        return replace(self.learnt.parameters, rate=self.learnt.new_share * flow)
+        p = self.learnt.parameters
+        appearance = p.appearance if self.compares_appearance else None
+        return replace(p, rate=self.learnt.new_share * flow, appearance=appearance)
 
     def _window(self, second_now: float) -> _LiveWindow:
         known = self._known
@@ -240,12 +259,19 @@ class LiveGap:
         before, place_before = _passages(first, self.learnt.first, self._names(0), second_now)
         after, place_after = _passages(second, self.learnt.second, self._names(1), second_now)
         n = len(known)
+        compared = None
+        if self.compares_appearance:
+            compared = (
+                _in_order(self._appearance[0].centred([one.appearance for one in first]), place_before),
+                _in_order(self._appearance[1].centred([one.appearance for one in second]), place_after),
+            )
         gap = Gap(
             before,
             after,
             traffic_speed(before),
             traffic_speed(after),
             apart_variance=self.learnt.own_variance,
+            known_appearance=compared,
         )
         weight = np.array([one[2] for one in known], dtype=np.float64)
         return _LiveWindow(
@@ -301,6 +327,7 @@ class LiveGap:
             "known": [[list(a), list(b), p] for a, b, p in self._known],
             "came": list(self._came),
             "slowness": self.slowness_now,
+            "appearance": [one.state() for one in self._appearance],
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -309,6 +336,15 @@ class LiveGap:
         self._waiting = [LivePassage(*one) for one in state["waiting"]]
         self._known = [(LivePassage(*a), LivePassage(*b), p) for a, b, p in state["known"]]
         self._came, self.slowness_now = list(state["came"]), float(state["slowness"])
+        for one, saved in zip(self._appearance, state["appearance"], strict=True):
+            one.set_state(saved)
+
+
+def _in_order(values: FloatArray, place: IntArray) -> FloatArray:
+    """Return rows (N, E), each at its place (N,)."""
+    out = np.empty_like(values)
+    out[place] = values
+    return out
 
 
 def _passages(

@@ -6,6 +6,7 @@ compared with each other.
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Sequence
 from typing import TypeAlias
 
@@ -53,6 +54,16 @@ def unit_embeddings(values: npt.ArrayLike, count: int) -> EmbeddingArray:
     found[other] /= np.abs(found[other]).max(axis=1, keepdims=True)
     found[other] /= np.sqrt(np.einsum("me,me->m", found[other], found[other]))[:, None]
     return found.astype(np.float32)
+
+
+def packed_embedding(values: npt.ArrayLike) -> str:
+    """Return an embedding (E,) as a short text, its numbers rounded to half precision."""
+    return base64.b64encode(np.asarray(values, dtype="<f2").tobytes()).decode("ascii")
+
+
+def unpacked_embedding(text: str) -> FloatArray:
+    """Return the embedding (E,) that `packed_embedding` made a text of; of an empty text no numbers."""
+    return np.frombuffer(base64.b64decode(text), dtype="<f2").astype(np.float64)
 
 
 def find_bad_embedding(values: FloatArray) -> int | None:

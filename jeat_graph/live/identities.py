@@ -51,6 +51,11 @@ class Identities:
         """Return what was given out (N,) for tracks by their own numbers (N,), all of which are known."""
         return own if self._unchanged else self._given[np.searchsorted(self._own, own)]
 
+    def own_of(self, given: int) -> int:
+        """Return the own number of the track that an identity was given out for; 0 if there is none."""
+        found = self._own[self._given == given]
+        return int(found[0]) if len(found) else 0
+
     def answer(self, table: Table) -> Table:
         """Return what `rename` does, for a table that is given out as the answer to a scan."""
         self._shown[np.searchsorted(self._own, table.track_id)] = True

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from jeat_graph.config.schema import Config, SensorConfig
-from jeat_graph.data.arrays import RecordArray
+from jeat_graph.data.arrays import FloatArray, RecordArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError, DataError, TimeOrderError
 from jeat_graph.data.trajectories import Trajectories
@@ -54,7 +54,7 @@ def check_saved(tracker: Tracker, what: str) -> None:
         raise ConfigError(f"{what} does not go with {tracker.not_saved_with}: it is not saved")
 
 
-@one_at_a_time("causal step save predict drain_smoothed finish")
+@one_at_a_time("causal appearance_of step save predict drain_smoothed finish")
 class LiveTracker(OneAtATime):
     """A tracker that takes scans in the order in which they arrive.
 
@@ -129,6 +129,10 @@ class LiveTracker(OneAtATime):
     def causal(self) -> Trajectories:
         """Return the tracks that are reported now, by the identities that were given out for them."""
         return self._rewinding.identities.rename(self.tracker.causal())
+
+    def appearance_of(self, identity: int) -> FloatArray | None:
+        """Return what a living track looks like by the identity given out (`Tracker.appearance_of`)."""
+        return self.tracker.appearance_of(self._rewinding.identities.own_of(identity))
 
     def step(self, scans: ScanLike | Sequence[ScanLike]) -> Arrival:
         """Take in one scan, or several of one time, which have just arrived.

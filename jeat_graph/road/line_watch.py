@@ -8,12 +8,13 @@ second late. Times are those of the answers.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.embeddings import packed_embedding
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.road.camera import RoadCamera
 from jeat_graph.road.lanes import Lanes
@@ -33,6 +34,9 @@ _LEAST_PLACE_M, _LEAST_SPEED_SHARE = 0.1, 0.01
 _SLOWEST, _FASTEST = 0.5, 90.0
 
 
+AppearanceOf: TypeAlias = Callable[[int], FloatArray | None]
+
+
 class LinePassage(NamedTuple):
     """A vehicle that has passed the line.
 
@@ -44,6 +48,7 @@ class LinePassage(NamedTuple):
         sigma_speed: standard deviation as a share of it.
         lane: name, or empty.
         kind: class, or empty.
+        appearance: its embedding when it passed (`data.embeddings.packed_embedding`), or empty.
     """
 
     track_id: int
@@ -53,18 +58,20 @@ class LinePassage(NamedTuple):
     sigma_speed: float
     lane: str
     kind: str
+    appearance: str = ""
 
 
 class _Way:
     """Places of a track near the line: time, distance beyond the line (m), share of the line, x and y (m)."""
 
-    __slots__ = ("crossed", "kind", "places", "reported")
+    __slots__ = ("appearance", "crossed", "kind", "places", "reported")
 
     def __init__(self) -> None:
         self.places: list[tuple[float, float, float, float, float]] = []
         self.crossed: float | None = None
         self.reported = False
         self.kind = ""
+        self.appearance = ""
 
 
 class LineWatch:
@@ -89,12 +96,15 @@ class LineWatch:
         self._share = share if math.isfinite(share) else 0.0
         self._ways: dict[int, _Way] = {}
 
-    def take(self, t: float, table: Trajectories) -> list[LinePassage]:
+    def take(
+        self, t: float, table: Trajectories, appearance_of: AppearanceOf | None = None
+    ) -> list[LinePassage]:
         """Take in the tracks of one moment.
 
         Args:
             t: time (s); one that is before the last is taken where it belongs.
             table: the tracks.
+            appearance_of: returns the embedding (E,) of a track, or None; asked as a track passes the line.
 
         Returns:
             The vehicles of which it is known now that they have passed.
@@ -117,14 +127,15 @@ class LineWatch:
             if way is None:
                 way = self._ways[identity] = _Way()
             way.kind = "" if table.classes is None else str(table.classes[k])
-            if not way.reported:
-                self._goes(way, t, (ahead, part, x, y))
+            if not way.reported and self._goes(way, t, (ahead, part, x, y)) and appearance_of is not None:
+                embedding = appearance_of(identity)
+                way.appearance = "" if embedding is None else packed_embedding(embedding)
         return [one for identity in list(self._ways) if (one := self._passage(t, identity)) is not None]
 
-    def _goes(self, way: _Way, t: float, place: tuple[float, float, float, float]) -> None:
-        """Add a place; the line is passed between two of them."""
+    def _goes(self, way: _Way, t: float, place: tuple[float, float, float, float]) -> bool:
+        """Add a place; whether the line was passed between this and the one before."""
         if way.places and t <= way.places[-1][0]:
-            return
+            return False
         before = way.places[-1] if way.places else None
         way.places.append((t, *place))
         if way.crossed is None:
@@ -133,6 +144,8 @@ class LineWatch:
                 if 0.0 <= before[2] + part * (place[1] - before[2]) <= 1.0:
                     way.crossed = before[0] + part * (t - before[0])
             way.places = [one for one in way.places if one[0] >= t - 2.0 * _REACH_S]
+            return way.crossed is not None
+        return False
 
     def _passage(self, now: float, identity: int) -> LinePassage | None:
         """What is to be told of a track now; one that has ended is forgotten."""
@@ -178,6 +191,7 @@ class LineWatch:
             math.hypot(max(speed_sd, _LEAST_SPEED_SHARE), self._share),
             str(self._lanes.of(np.array([x]))[0]),
             way.kind,
+            way.appearance,
         )
 
     @staticmethod
@@ -188,17 +202,17 @@ class LineWatch:
     def state(self) -> list[list[Any]]:
         """Return what `set_state` takes: plain data."""
         return [
-            [identity, way.crossed, way.reported, way.kind, [list(one) for one in way.places]]
+            [identity, way.crossed, way.reported, way.kind, way.appearance, list(map(list, way.places))]
             for identity, way in self._ways.items()
         ]
 
     def set_state(self, state: list[list[Any]]) -> None:
         """Go on from what `state` returned."""
         self._ways = {}
-        for identity, crossed, reported, kind, places in state:
+        for identity, crossed, reported, kind, appearance, places in state:
             way = self._ways.setdefault(int(identity), _Way())
             way.crossed, way.reported, way.kind = crossed, bool(reported), str(kind)
-            way.places = [tuple(one) for one in places]
+            way.appearance, way.places = str(appearance), [tuple(one) for one in places]
 
 
 def chosen_line(lines: Mapping[str, Any], wanted: str | None) -> str:

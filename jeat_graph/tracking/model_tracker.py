@@ -311,6 +311,19 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
             out[self._order] = self._model.assigned()
         return out
 
+    def appearance_of(self, identity: int) -> FloatArray | None:
+        """Return what a living track looks like, as embeddings (E,); None where that is not known.
+
+        It is the fading mean of the embeddings of its detections, and the mean of this over the sensors that
+        have seen it.
+        """
+        if self._appearance is None:
+            return None
+        row = np.flatnonzero(self._appearance.track_id == identity)
+        seen = self._appearance.mean[row].reshape(-1, self._appearance.mean.shape[2])
+        seen = seen[seen.any(axis=1)]
+        return seen.mean(axis=0) if len(seen) else None
+
     def living(self) -> tuple[IntArray, int]:
         """Return the identities (N,) of the living tracks, and that of the next one to be born."""
         return self._model.identities(), self._model.born() + 1

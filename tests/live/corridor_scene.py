@@ -16,6 +16,7 @@ from jeat_graph.road.camera_file import write_camera
 GAPS_M = {"A-B": 150.0, "B-C": 200.0}
 NAMES = "ABC"
 HZ = 10.0
+NUMBERS = 8  # of an embedding
 LINE_M, FROM_M, TO_M = 40.0, 22.0, 75.0
 
 
@@ -32,6 +33,7 @@ def learnt(offsets_s=(0.0, 0.0)) -> dict:
         model = {"weights": [0.5, 0.5], "carry": 0.9, "speed_spread": 0.03, "length_shift": 0.0}
         model |= {"length_spread": 0.1, "slowness_sd": 0.0, "slowness_time_s": 60.0}
         model |= {"new_share": 0.1, "own_variance": 0.02}
+        model |= {"appearance": {"same": 0.9, "other": 0.0, "sigma": 0.3, "numbers": NUMBERS}}
         gaps.append(
             {"from": first, "to": second, "offset_s": offset, "distance_m": metres}
             | {"covariance": [[0.01, 0.0], [0.0, 1.0]], "slowness": 0.0, "spread": 0.02}
@@ -71,12 +73,16 @@ web: {{port: 0}}
 
 
 def traffic(count: int, headway_s: float, seed: int) -> dict[str, np.ndarray]:
-    """Vehicles that drive evenly through all cameras: `t` (N, 3) at the lines, `speed` (N,), `x` (N,)."""
+    """Vehicles that drive evenly through all cameras: `t` (N, 3), `speed` (N,), `x` (N,), `looks` (N, 8)."""
     rng = np.random.default_rng(seed)
     speed = 25.0 * np.exp(0.12 * rng.normal(size=count))
     start = 6.0 + np.cumsum(headway_s * rng.uniform(0.4, 1.6, count))
     way = np.cumsum([0.0, *GAPS_M.values()])
-    return {"t": start[:, None] + way / speed[:, None], "speed": speed, "x": rng.choice([-2.0, 2.0], count)}
+    return {
+        "t": start[:, None] + way / speed[:, None],
+        "speed": speed,
+        "x": rng.choice([-2.0, 2.0], count),
+    } | {"looks": rng.normal(size=(count, NUMBERS))}
 
 
 def messages(vehicles: dict[str, np.ndarray], camera: int, end_s: float) -> list[tuple[float, bytes]]:
@@ -92,6 +98,9 @@ def messages(vehicles: dict[str, np.ndarray], camera: int, end_s: float) -> list
         foot = foot + 0.01 * size[:, None] * rng.normal(size=foot.shape)
         boxes = np.c_[foot[:, 0] - 0.9 * size, foot[:, 1] - 1.5 * size, 1.8 * size, 1.5 * size]
         scan = {"t": t, "sensor": "rgb", "boxes": boxes.round(2).tolist(), "scores": [0.9] * len(boxes)}
+        if len(boxes):
+            shown = vehicles["looks"][seen] + 0.2 * rng.normal(size=(len(boxes), NUMBERS))
+            scan["embeddings"] = shown.round(3).tolist()
         found.append((t, json.dumps({"v": 1, "source": NAMES[camera], "seq": k, "scans": [scan]}).encode()))
     return found
 

@@ -13,6 +13,7 @@ import yaml
 from live_tests import corridor_scene as scene
 
 from jeat_graph.cli.main import main
+from jeat_graph.corridor import live_appearance
 from jeat_graph.live.service import corridor_run, ends
 from jeat_graph.live.service.corridor_config import read_corridor_service
 from jeat_graph.live.service.corridor_metrics import CorridorMetrics
@@ -75,7 +76,8 @@ def come_to(broker, name):
     return len(broker.answered.get(f"{name}/tracks", ())) >= due
 
 
-def test_vehicles_are_followed_whatever_happens_to_one_camera(broker, tmp_path):
+def test_vehicles_are_followed_whatever_happens_to_one_camera(broker, tmp_path, monkeypatch):
+    monkeypatch.setattr(live_appearance, "_LEAST", 5)
     pytest.importorskip("nats", reason="the client is not installed")
     vehicles = scene.traffic(12, 2.0, 4)
     end_s = float(vehicles["t"].max()) + 8.0
@@ -133,6 +135,8 @@ def test_vehicles_are_followed_whatever_happens_to_one_camera(broker, tmp_path):
     assert shown["corridor"]["gaps"][0]["followed"] >= 11
     assert families["jeat_graph_passages_total", "C"] == 12.0
     assert families["jeat_graph_followed_total", "A", "B"] >= 11.0
+    assert shown["corridor"]["gaps"][1]["d_prime"] == 3.0, "looks came with the messages"
+    assert families["jeat_graph_appearance_d_prime", "B", "C"] == 3.0
     assert families["jeat_graph_ready", "B"] == 1.0
     assert len(families) > 60
 

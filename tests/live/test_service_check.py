@@ -62,6 +62,7 @@ def test_a_good_file_is_valid_and_nothing_is_made(tmp_path, capsys):
         ("detector: motion", "detector: yolo-nano-typo", "sources[0].detector: "),
         ("detector: motion", "detector: service.yaml", "sources[0].detector: "),
         ("detector: motion", "set: [frames.nothing=1]", "frames.nothing"),
+        ("detector: motion", "embedder: reid.pt", "sources[0].embedder: "),
         ("smoothed: state/rows.csv", "smoothed: service.yaml/rows.csv", "state.smoothed: "),
         ("checkpoint: state/a.npz", "checkpoint: .", "state.checkpoint: "),
         ("web: {port: 0}", "web: {host: 192.0.2.7}", "web.host: 192.0.2.7: is no address of this machine"),

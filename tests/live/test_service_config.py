@@ -72,6 +72,13 @@ def test_paths_are_seen_from_the_folder_of_the_file(tmp_path, monkeypatch):
         ("  - url: nats://host/scans", "  - ulr: nats://host/scans", 4, "did you mean sources[0].url?"),
         ("rtsp://cam/road", "road.mp4", 5, "sources[1].frames: is no camera that is on"),
         ("    detector: motion", "    tls: {ca: x}", 6, "sources[1].tls: says nothing of a camera"),
+        (
+            "nats://host/scans",
+            "nats://host/scans\n    embedder: colour",
+            5,
+            "sources[0].embedder: says nothing",
+        ),
+        ("frames: rtsp://cam/road", "events: /dev/x\n    embedder: colour", 6, "describes boxes in pictures"),
         ("    detector: motion", "    url: nats://h/t", 5, "sources[1]: names url and frames"),
         ("mqtts://host/tracks", "mqtts://host/a/#", 8, "tracks go to one topic, without wild cards"),
         ("mqtts://host/tracks", "nats://host/scans", 4, "would come back as scans"),

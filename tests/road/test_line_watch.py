@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from road_scenes import camera as camera_over_road
 
+from jeat_graph.data.embeddings import unpacked_embedding
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.road.crossings import road_line
 from jeat_graph.road.lanes import given_lanes
@@ -93,6 +94,22 @@ def test_a_state_goes_on_where_it_was():
             found[saved_at] += watch.take(k / 10.0, table(k / 10.0, [3], pixels))
     assert len(found[None]) == 1
     assert all(one == found[None] for one in found.values())
+
+
+def test_a_track_is_asked_once_what_it_looks_like_as_it_passes():
+    camera, asked = camera_over_road(), []
+    watch = LineWatch(camera, line_at(camera, 40.0), "left", LANES)
+
+    def looks(identity):
+        asked.append((identity, k))
+        return np.array([0.5, float(identity)])
+
+    found = []
+    for k in range(40):
+        pixels = camera.project(np.array([[2.0, 20.0 + 2.0 * k, 0.0], [6.0, 21.0 + 2.0 * k, 0.0]]))[0]
+        found += watch.take(k / 10.0, table(k / 10.0, [3, 4], pixels), looks)
+    assert sorted(asked) == [(3, 10), (4, 10)]
+    assert [unpacked_embedding(one.appearance).tolist() for one in found] == [[0.5, 3.0], [0.5, 4.0]]
 
 
 def test_a_track_that_ends_behind_the_line_is_told_and_forgotten():

@@ -131,6 +131,7 @@ def detect_request(source: SourceConfig) -> DetectRequest:
         detector_frames=detector if frames else MOTION,
         detector_events=MOTION if frames else detector,
         settings=settings,
+        embedder=source.embedder,
         masks=read_masks([mask for mask in source.masks if mask != _NO_MASK]),
         find_clock=_NO_MASK not in source.masks,
     )

@@ -17,6 +17,7 @@ from pathlib import Path
 from jeat_graph.config.reading import load_config
 from jeat_graph.config.schema import Config
 from jeat_graph.data.errors import ConfigError, JeatGraphError
+from jeat_graph.detection.embedding import open_embedder
 from jeat_graph.detection.named import AUTO, EVENTS, FRAMES, MOTION, network_file
 from jeat_graph.live.late import LiveTracker, check_saved
 from jeat_graph.live.service.cameras import Cameras, detect_request
@@ -74,6 +75,10 @@ def check_start(config: ServiceConfig, *, detectors: bool) -> None:
                 _check_camera(source, detectors)
             except JeatGraphError as error:
                 raise ConfigError(f"sources[{k}].detector: {error}") from None
+            try:
+                _check_embedder(source, detectors)
+            except JeatGraphError as error:
+                raise ConfigError(f"sources[{k}].embedder: {error}") from None
 
 
 def check_corridor(config: CorridorConfig, *, detectors: bool) -> None:
@@ -220,6 +225,12 @@ def _check_camera(source: SourceConfig, detectors: bool) -> None:
         from jeat_graph.detection.detecting import event_detector
 
         event_detector(request, _SOME_SIZE, str)
+
+
+def _check_embedder(source: SourceConfig, load: bool) -> None:
+    """Build what describes a camera's boxes."""
+    if source.embedder is not None and load:
+        open_embedder(source.embedder, detect_request(source).settings.embedder)
 
 
 def _reach(address: Address) -> None:

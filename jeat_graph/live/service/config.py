@@ -50,6 +50,7 @@ class SourceConfig(Section):
     classes: tuple[str, ...] = ()
     masks: tuple[str, ...] = ()
     set: tuple[str, ...] = ()
+    embedder: str | None = None
 
     @property
     def given(self) -> tuple[str, str]:
@@ -202,6 +203,7 @@ def resolved(config: ServiceConfig, folder: Path) -> ServiceConfig:
                 password_file=at(one.password_file),
                 tls=tls(one.tls),
                 detector=None if one.detector is None else file_if_there(one.detector),
+                embedder=None if one.embedder is None else file_if_there(one.embedder),
                 masks=tuple(file_if_there(mask) for mask in one.masks),
             )
             for one in config.sources
@@ -252,11 +254,13 @@ def _check_source(source: SourceConfig, where: str) -> None:
             f"{where}: names {' and '.join(given) or 'nothing'}; give one of {', '.join(_KINDS)}"
         )
     kind = given[0]
-    for name in ("detector", "sensor", "classes", "masks", "set") if kind == "url" else ("tls",):
+    for name in ("detector", "sensor", "classes", "masks", "set", "embedder") if kind == "url" else ("tls",):
         if getattr(source, name):
             raise ConfigError(
                 f"{where}.{name}: says nothing of {'a broker' if kind == 'url' else 'a camera'}"
             )
+    if kind == "events" and source.embedder:
+        raise ConfigError(f"{where}.embedder: describes boxes in pictures; a camera of events has none")
     try:
         if kind == "url":
             return

@@ -17,7 +17,7 @@ from jeat_graph.live.service.config import ServiceConfig
 from jeat_graph.live.service.log import ERROR, Log
 from jeat_graph.live.service.run import Service
 from jeat_graph.live.service.status import Status
-from jeat_graph.road.line_watch import LinePassage, LineWatch
+from jeat_graph.road.line_watch import AppearanceOf, LinePassage, LineWatch
 
 _SLICE_S = 0.1
 #: A service that has run for so long (s) was well: what ends it then is tried again at once.
@@ -49,10 +49,10 @@ class PassageWatch:
                 for row in state["kept"]:
                     self._add(LivePassage(*row))
 
-    def answered(self, t: float, table: Trajectories) -> None:
+    def answered(self, t: float, table: Trajectories, appearance_of: AppearanceOf) -> None:
         """Take in the tracks of a time (s)."""
         with self._lock:
-            for one in self._line.take(t, table):
+            for one in self._line.take(t, table, appearance_of):
                 self._add(_passage(one))
             self._until = self._line.until(t)
 
@@ -80,7 +80,8 @@ class PassageWatch:
 
 def _passage(one: LinePassage) -> LivePassage:
     return LivePassage(
-        one.track_id, one.t, one.sigma_t, math.log(one.speed), one.sigma_speed, one.lane, one.kind
+        *(one.track_id, one.t, one.sigma_t, math.log(one.speed), one.sigma_speed),
+        *(one.lane, one.kind, one.appearance),
     )
 
 

@@ -69,6 +69,7 @@ class CorridorMetrics(MetricsText):
             (gauge, "on_the_way", "on_way", "vehicles in a gap"),
             (gauge, "followed_share", "followed_share", "of the last vehicles at the second camera"),
             (gauge, "learnt_share", "learnt_share", "that share when the corridor was learnt"),
+            (gauge, "appearance_d_prime", "d_prime", "of embeddings that are compared, as learnt"),
             (gauge, "slowness", "slowness", "ln travel time beyond what speeds and learning say"),
             (gauge, "travel_time_seconds", "mean_s", "mean of the vehicles of the last interval"),
             (gauge, "travel_time_low_seconds", "low_s", "lower end of its 95 % interval"),

@@ -34,7 +34,7 @@ _DECIDE_S = 10.0
 _SLICE_S = 0.1
 #: After a signal a camera's end is waited for so long (s).
 _END_S = 20.0
-_VERSION = 1
+_VERSION = 2
 
 
 class CorridorService:

@@ -31,6 +31,7 @@ from jeat_graph.live.session import MESSAGE_ERRORS, Ends, Session, of_message
 from jeat_graph.live.session_warnings import BadLines
 from jeat_graph.live.smoothed_file import SmoothedFile, has_rows
 from jeat_graph.live.transport.patience import UnconfirmedError
+from jeat_graph.road.line_watch import AppearanceOf
 from jeat_graph.tracking.tracker import Tracker
 
 #: Timeout of a receive (s): of the only source, and of one of several.
@@ -59,8 +60,8 @@ class Watcher(Protocol):
     def begin(self, state: Any) -> None:
         """Go on from what `state` returned, or start over with None."""
 
-    def answered(self, t: float, table: Trajectories) -> None:
-        """Take in the tracks of a time (s), which has been answered."""
+    def answered(self, t: float, table: Trajectories, appearance_of: AppearanceOf) -> None:
+        """Take in the tracks of a time (s), which has been answered; `appearance_of` tells of their looks."""
 
     def state(self) -> Any:
         """Return what a checkpoint keeps: plain data."""
@@ -182,7 +183,7 @@ class Service:
         session = Session(
             live,
             Ends(
-                tracks=self._answering(sinks),
+                tracks=self._answering(sinks, live),
                 event=sinks.event,
                 warn=log.say,
                 smoothed=smoothed,
@@ -262,13 +263,13 @@ class Service:
         self._log.say(f"warning: {why}; it is {aside} now, and rows go into a new file")
         return SmoothedFile(path, None, self._overdue)
 
-    def _answering(self, sinks: Sinks) -> Any:
+    def _answering(self, sinks: Sinks, live: LiveTracker) -> Any:
         status = self.status
 
         def answer(t: float, table: Trajectories, message: ScanMessage, _: float) -> None:
             sinks.send(t, table, message)
             if self._watcher is not None:
-                self._watcher.answered(t, table)
+                self._watcher.answered(t, table, live.appearance_of)
             status.answered(t, len(table), time.monotonic() - self._came)
 
         return answer
