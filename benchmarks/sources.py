@@ -30,8 +30,8 @@ _DATA = {
     "jeat_graph.detection.network_cache": ("jeat_graph/detection/weights", ("*",)),
     "jeat_graph_sehn.simulation.scenario": ("sehn/jeat_graph_sehn/scenarios", ("*.yaml",)),
 }
-#: The compiled package: each folder is a submodule, bound by its `module.cpp`; these files belong to all. A header
-#: may have its functions in a source of its name.
+#: The compiled package: each folder is a submodule, bound by its `module.cpp`; these files belong to all. A
+#: header may have its functions in a source of its name.
 _CORE = "jeat_graph.core"
 _BUILT_BY = ("module.cpp", "CMakeLists.txt")
 _INCLUDED = re.compile(r'^\s*#include "([^"]+)"', re.MULTILINE)

@@ -57,6 +57,12 @@ class Appearances(NamedTuple):
         living = living.copy()
         return Appearances(living, carried_over(self.mean, self.track_id, living), self.moments)
 
+    def of_track(self, identity: int) -> FloatArray | None:
+        """Return what a track looks like (E,), the mean over the sensors that have seen it; or None."""
+        seen = self.mean[self.track_id == identity].reshape(-1, self.mean.shape[2])
+        seen = seen[seen.any(axis=1)]
+        return seen.mean(axis=0) if len(seen) else None
+
     def among(self, num_sensors: int) -> Appearances:
         """Return the same where there are more sensors, which have seen nothing yet."""
         more = num_sensors - len(self.moments)

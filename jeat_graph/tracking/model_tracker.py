@@ -312,17 +312,8 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         return out
 
     def appearance_of(self, identity: int) -> FloatArray | None:
-        """Return what a living track looks like, as embeddings (E,); None where that is not known.
-
-        It is the fading mean of the embeddings of its detections, and the mean of this over the sensors that
-        have seen it.
-        """
-        if self._appearance is None:
-            return None
-        row = np.flatnonzero(self._appearance.track_id == identity)
-        seen = self._appearance.mean[row].reshape(-1, self._appearance.mean.shape[2])
-        seen = seen[seen.any(axis=1)]
-        return seen.mean(axis=0) if len(seen) else None
+        """Return what a living track looks like, as embeddings (E,); None where that is not known."""
+        return None if self._appearance is None else self._appearance.of_track(identity)
 
     def living(self) -> tuple[IntArray, int]:
         """Return the identities (N,) of the living tracks, and that of the next one to be born."""
@@ -463,13 +454,10 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
 
     def _compare(self, embeddings: EmbeddingArray, sensor: IntArray) -> Compared:
         """Compare the embeddings (M, E) of a step's detections with the living tracks."""
-        appearance, number = self._appearance, len(self._engine_sensors)
-        appearance = (
-            appearance.among(number)
-            if appearance is not None
-            else Appearances.start(number, embeddings.shape[1])
-        )
-        return compare(appearance.of(self._model.identities()), embeddings, sensor, _MOST_SIMILARITY)
+        number = len(self._engine_sensors)
+        before = self._appearance or Appearances.start(number, embeddings.shape[1])
+        now = before.among(number).of(self._model.identities())
+        return compare(now, embeddings, sensor, _MOST_SIMILARITY)
 
     def _count_classes(self, batch: Sequence[Scan]) -> None:
         """Let the boxes of a step vote for the classes of their tracks."""
