@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
 import numpy as np
 
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import IntArray
-from jeat_graph.data.errors import DataError, JeatGraphError
+from jeat_graph.data.errors import DataError
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.tracking.appearance import Appearances
 from jeat_graph.tracking.classes import ClassTally
@@ -22,6 +22,9 @@ from jeat_graph.tracking.identities.lagging import LagSmoother
 from jeat_graph.tracking.identities.log import IdentityLog
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.smoothed_instants import SmoothedInstants
+
+if TYPE_CHECKING:
+    from jeat_graph.tracking.model_tracker import ModelTracker
 
 
 class ModelSnapshot(NamedTuple):
@@ -86,9 +89,7 @@ class SavedModel:
     @property
     def not_saved_with(self) -> str | None:
         """The setting with which a tracker is not saved, or None where it is."""
-        if not self._model.can_save:
-            return f"tracker.engine={self.config.tracker.engine}"
-        return None if self._lag is None else "smoother.identities=lag"
+        return None if self._model.can_save else f"tracker.engine={self.config.tracker.engine}"
 
     def save(self, path: str | Path) -> None:
         """Write the whole state to a file (`.npz`), smoothers included, for `load` to go on from.
@@ -117,8 +118,6 @@ class SavedModel:
         Raises:
             JeatGraphError: the engine is not saved.
         """
-        if self._lag is not None:
-            raise JeatGraphError(f"a tracker with {self.not_saved_with} is not saved")
         now = self.snapshot() if snapshot is None else snapshot
         return {
             "diagnostics": self._diagnostics,
@@ -135,6 +134,7 @@ class SavedModel:
             "called": self._called,
             "instants": self._instants.state(),
             "log": None if self._log is None else self._log.state(),
+            "lag": None if self._lag is None else self._lag.state(),
         }
 
     @classmethod
@@ -170,6 +170,10 @@ class SavedModel:
             raise DataError("is damaged: detections of the recording are missing")
         if tracker._log is not None:
             tracker._log = IdentityLog.from_state(state["log"])
+        if (tracker._lag is None) != (state["lag"] is None):
+            raise DataError("is damaged: what was decided with a lag is missing")
+        if tracker._lag is not None:
+            tracker._lag.set_state(state["lag"], cast("ModelTracker", tracker))
         tracker._class_ids = {str(name): int(number) for name, number in state["class_ids"].items()}
         _check_labels(state["model"], len(called))
         tracker._instants.set_state(state["instants"])

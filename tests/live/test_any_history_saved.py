@@ -20,6 +20,7 @@ COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var")
 CONFIGS = {
     "lag": load_config("default", ["smoother.lag_s=0.3"]),
     "whole": load_config("default", ["smoother.engine=rts"]),
+    "decided": load_config("default", ["smoother.lag_s=0.3", "smoother.identities=lag"]),
     "none": load_config("default", ["smoother.engine=none"]),
     # The clock of one sensor is known to be behind.
     "apart": load_config("default", ["smoother.lag_s=0.3", "sensors.evt.latency_s=0.4", "live.late_s=0.5"]),
@@ -28,7 +29,10 @@ CONFIGS = {
 
 def table_bytes(table):
     classes = () if table.classes is None else (table.classes.tolist(), table.class_probability.tobytes())
-    return (*(getattr(table, name).tobytes() for name in COLUMNS), sensors_of(table), *classes)
+    decided = (
+        () if table.causal_id is None else (table.causal_id.tobytes(), table.identity_probability.tobytes())
+    )
+    return (*(getattr(table, name).tobytes() for name in COLUMNS), sensors_of(table), *classes, *decided)
 
 
 def sensors_of(table):
@@ -80,6 +84,7 @@ BACK = [(20.18, "evt", 2), (-2.65, "rgb", 2), (2.26, "rgb", 2), (-3.95, "evt", 2
     diagnostics=st.booleans(),
 )
 @example(before=BACK, after=[], name="lag", policy="rewind", diagnostics=False)
+@example(before=BACK, after=BACK, name="decided", policy="rewind", diagnostics=False)
 @example(before=BACK, after=[(0.0, "rgb", 2)], name="none", policy="rewind", diagnostics=True)
 def test_after_any_history_a_live_tracker_is_saved_and_goes_on(before, after, name, policy, diagnostics):
     drains, t = name != "none", 0.0
@@ -113,7 +118,9 @@ ACT = st.one_of(
 
 @settings(max_examples=15 * TIMES)
 @given(
-    acts=st.lists(ACT, max_size=20), cut=st.integers(0, 20), name=st.sampled_from(["lag", "whole", "none"])
+    acts=st.lists(ACT, max_size=20),
+    cut=st.integers(0, 20),
+    name=st.sampled_from(["lag", "decided", "whole", "none"]),
 )
 @pytest.mark.parametrize("diagnostics", [False, True])
 def test_after_any_calls_a_tracker_is_saved_and_goes_on(acts, cut, name, diagnostics):

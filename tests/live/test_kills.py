@@ -31,12 +31,19 @@ def lines(simulated):
     ]
 
 
-def options(folder):
+@pytest.fixture(params=["causal", "lag"])
+def identities(request):
+    return request.param
+
+
+def options(folder, identities):
     return [
         *("--smoothed", str(folder / "s.csv"), "--checkpoint", str(folder / "state.npz"), "--every", "0.3"),
         *(
             "--set",
             "smoother.lag_s=0.4",
+            "--set",
+            f"smoother.identities={identities}",
             "--record",
             str(folder / "record.json"),
         ),
@@ -44,13 +51,13 @@ def options(folder):
 
 
 @pytest.fixture
-def to_the_end(lines, monkeypatch, capsys):
+def to_the_end(lines, identities, monkeypatch, capsys):
     """Run the command over all lines in this process, as nothing is to be killed; answers, complaints."""
 
     def run(folder):
         monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"".join(lines))))
         capsys.readouterr()
-        code = main(["stream", *options(folder)])
+        code = main(["stream", *options(folder, identities)])
         said = capsys.readouterr()
         assert code == 0, f"{said.err}\n{[(p.name, p.stat()) for p in folder.iterdir()]}"
         return said.out.encode().splitlines(), said.err
@@ -64,10 +71,10 @@ def counts_of(folder):
     return {key: value for key, value in record.items() if key != "duplicates"}
 
 
-def killed_after(answers, lines, folder, start):
+def killed_after(answers, lines, folder, start, identities):
     """Start it, read so many answers, kill it."""
     folder.mkdir(exist_ok=True)
-    process = start("stream", *options(folder))
+    process = start("stream", *options(folder, identities))
     try:
         # More than is answered is on its way, so that the kill may come anywhere in a step or a checkpoint.
         writer = os.dup(process.stdin.fileno())
@@ -89,7 +96,9 @@ def killed_after(answers, lines, folder, start):
     return said
 
 
-def test_killed_and_started_again_it_says_and_writes_the_same(lines, to_the_end, start, tmp_path, full):
+def test_killed_and_started_again_it_says_and_writes_the_same(
+    lines, identities, to_the_end, start, tmp_path, full
+):
     whole = tmp_path / "whole"
     whole.mkdir()
     answers, _ = to_the_end(whole)
@@ -98,7 +107,7 @@ def test_killed_and_started_again_it_says_and_writes_the_same(lines, to_the_end,
     moments = [len(lines) // 2, *rng.integers(1, len(lines) - 8, 50 if full else 0).tolist()]
     for k, moment in enumerate(moments):
         folder = tmp_path / f"killed{k}"
-        said = killed_after(moment, lines, folder, start)
+        said = killed_after(moment, lines, folder, start, identities)
         assert said == answers[: len(said)]
         # The input comes again from its beginning: what the checkpoint holds is passed over.
         again, complaints = to_the_end(folder)

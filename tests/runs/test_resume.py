@@ -66,11 +66,13 @@ def record_of(out):
     return {key: value for key, value in record.items() if key != "timings"}
 
 
-@pytest.mark.parametrize("engine", ["fixed-lag", "gtsam"])
+@pytest.mark.parametrize(
+    "setting", ["smoother.engine=fixed-lag", "smoother.engine=gtsam", "smoother.identities=lag"]
+)
 def test_broken_off_anywhere_and_gone_on_with_it_writes_the_same_files(
-    engine, recording, tmp_path, monkeypatch
+    setting, recording, tmp_path, monkeypatch
 ):
-    options = ["--smoother", engine] if engine == "fixed-lag" else ["--set", f"smoother.engine={engine}"]
+    options = ["--set", setting]
     assert track(recording, tmp_path / "whole", *options) == 0
     out = tmp_path / "broken"
     broken_off(monkeypatch, recording, out, 20, *options)  # before anything was saved

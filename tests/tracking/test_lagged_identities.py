@@ -13,17 +13,13 @@ from jeat_graph import Scan, Tracker, Trajectories, load_config, read_run
 from jeat_graph.association.linking import Past, Pieces, join
 from jeat_graph.association.path_cover import Links
 from jeat_graph.cli.main import main
-from jeat_graph.data.errors import ConfigError, JeatGraphError
-from jeat_graph.live.late import LiveTracker, check_saved
+from jeat_graph.data.errors import ConfigError
+from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.service.checking import tracker_config
 from jeat_graph.live.service.config import TrackedBy
 from jeat_graph.tracking.identities.passes import took
-from jeat_graph.tracking.identities.windows import (
-    LagDecider,
-    WindowRows,
-    _continuing,
-    _one_piece_an_identity,
-)
+from jeat_graph.tracking.identities.window_rows import WindowRows, continuing, one_piece_an_identity
+from jeat_graph.tracking.identities.windows import LagDecider
 
 SIZE = ("image.width=3840", "image.height=2160")
 LAG = ("smoother.identities=lag", *SIZE)
@@ -157,17 +153,9 @@ def test_rows_so_far_are_what_an_end_now_would_give():
     assert len(so_far) > 0
 
 
-def test_it_is_not_saved_and_says_so(tmp_path):
-    tracker = Tracker(load_config("default", LAG))
-    assert not tracker.can_save
-    with pytest.raises(JeatGraphError, match=r"smoother\.identities=lag is not saved"):
-        tracker.save(tmp_path / "state.npz")
-    with pytest.raises(ConfigError, match=r"--checkpoint does not go with smoother\.identities=lag"):
-        check_saved(tracker, "--checkpoint")
+def test_a_service_takes_it_and_the_engine_of_the_paper_does_not():
     asked = TrackedBy(set=("smoother.identities=lag",))
-    with pytest.raises(ConfigError, match="'lag' is not saved, and a service saves its state"):
-        tracker_config(asked, [], None, smoothed=True)
-    assert tracker_config(asked, [], None, smoothed=False).smoother.engine == "none"
+    assert tracker_config(asked, [], None, smoothed=True).smoother.identities == "lag"
     with pytest.raises(ConfigError, match="'lag' needs another engine"):
         load_config("paper", ["smoother.identities=lag"])
 
@@ -202,12 +190,12 @@ def test_a_track_goes_on_with_the_identity_whose_last_detection_it_has():
     rows = WindowRows(
         np.arange(n), np.arange(n) / 10.0, np.zeros(n, int), np.zeros((n, 4)), causal, np.zeros(n), owner
     )
-    assert _continuing(rows, causal).tolist() == [-10, -20, -20, -10, -20, -10, 3]
+    assert continuing(rows, causal).tolist() == [-10, -20, -20, -10, -20, -10, 3]
     # A track whose identity went on with another one in the meantime continues nothing.
     rows = rows._replace(owner=np.array([10, 20, 10, 10, -1, -1, -1]))
-    assert _continuing(rows, causal).tolist() == [-10, -20, -10, -10, 1, -10, 3]
+    assert continuing(rows, causal).tolist() == [-10, -20, -10, -10, 1, -10, 3]
     piece = np.array([0, 1, 2, 3, 2, 3, 4])
-    assert _one_piece_an_identity(piece, rows.owner).tolist() == [0, 1, 0, 0, 0, 0, 2]
+    assert one_piece_an_identity(piece, rows.owner).tolist() == [0, 1, 0, 0, 0, 0, 2]
 
 
 def test_of_a_recording_that_goes_on_births_and_exits_are_counted_from_its_beginning():

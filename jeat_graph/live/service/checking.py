@@ -129,8 +129,6 @@ def tracker_config(
         raise ConfigError("state.smoothed needs a smoother, but smoother.engine is none")
     if made.smoother.identities == "whole":
         raise ConfigError("smoother.identities: 'whole' needs the whole recording, which a service never has")
-    if made.smoother.identities == "lag":
-        raise ConfigError("smoother.identities: 'lag' is not saved, and a service saves its state")
     return made
 
 

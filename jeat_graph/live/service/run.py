@@ -179,7 +179,9 @@ class Service:
             log.write(INFO, f"goes on from {config.state.checkpoint}")
         smoothed = None
         if config.state.smoothed is not None:
-            smoothed = stack.enter_context(self._smoothed_file(config.state.smoothed, more.get("smoothed")))
+            smoothed = stack.enter_context(
+                self._smoothed_file(config.state.smoothed, more.get("smoothed"), live)
+            )
         session = Session(
             live,
             Ends(
@@ -249,11 +251,12 @@ class Service:
                 self._log.say(f"warning: {text}")
         return None
 
-    def _smoothed_file(self, path: str, keep_bytes: int | None) -> SmoothedFile:
+    def _smoothed_file(self, path: str, keep_bytes: int | None, live: LiveTracker) -> SmoothedFile:
         """The file of smoothed rows; one that is not gone on with is renamed, never overwritten."""
+        decided = live.tracker.config.smoother.identities == "lag"
         try:
             if keep_bytes is not None or not has_rows(path):
-                return SmoothedFile(path, keep_bytes, self._overdue)
+                return SmoothedFile(path, keep_bytes, self._overdue, identities=decided)
             why = f"{path}: is of a run that is not continued"
         except DataError as error:
             if not has_rows(path):  # a folder, say
@@ -261,7 +264,7 @@ class Service:
             why = str(error)
         aside = set_aside(path, "earlier")
         self._log.say(f"warning: {why}; it is {aside} now, and rows go into a new file")
-        return SmoothedFile(path, None, self._overdue)
+        return SmoothedFile(path, None, self._overdue, identities=decided)
 
     def _answering(self, sinks: Sinks, live: LiveTracker) -> Any:
         status = self.status

@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from jeat_graph.association.linking import TERMS
 from jeat_graph.config.smoothing import LAGGED, SmootherConfig
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Scan
@@ -22,6 +23,19 @@ from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.tracking.identities.passes import Pass
 from jeat_graph.tracking.identities.retracking import lacking, last_before
+from jeat_graph.tracking.identities.saved_parts import (
+    by_number,
+    damaged,
+    floats,
+    ints,
+    number_pairs,
+    number_times,
+    real_number,
+    table_of,
+    table_state,
+    tracker_of,
+    tracker_state,
+)
 from jeat_graph.tracking.identities.windows import DecidedStep, LagDecider, no_links
 
 if TYPE_CHECKING:
@@ -79,6 +93,31 @@ class _Whole:
         causal = self.causal_of.pop(owner, None)
         if causal is not None:
             self.of_causal[causal] = (owner, self.since[owner])
+
+    def state(self) -> dict[str, Any]:
+        """Return plain data for `of_state`."""
+        return {
+            "owner": by_number({causal: owner for causal, (owner, _) in self.of_causal.items()}, np.int64),
+            "until": by_number({causal: t for causal, (_, t) in self.of_causal.items()}, np.float64),
+            "causal": by_number(self.causal_of, np.int64),
+            "since": by_number(self.since, np.float64),
+            "last": by_number(self.last, np.float64),
+        }
+
+    @classmethod
+    def of_state(cls, state: dict[str, Any]) -> _Whole:
+        """Return what gave a state.
+
+        Raises:
+            DataError: nothing can have given it.
+        """
+        made, owner, until = cls(), number_pairs(state["owner"]), number_times(state["until"])
+        if owner.keys() != until.keys():
+            raise damaged("tracks")
+        made.of_causal = {causal: (owner[causal], until[causal]) for causal in owner}
+        made.causal_of = number_pairs(state["causal"])
+        made.since, made.last = number_times(state["since"]), number_times(state["last"])
+        return made
 
     def forget(self, causal: set[int], owners: set[int]) -> None:
         """Forget all but some."""
@@ -165,7 +204,58 @@ class LagSmoother:
 
     def finish(self, tracker: ModelTracker, causal: Trajectories) -> Trajectories:
         """Decide the rest and return all rows that are left."""
-        return Trajectories.concatenate([*self._ready, self._all_rows(tracker, causal)])
+        ready, self._ready = self._ready, []
+        return Trajectories.concatenate([*ready, self._all_rows(tracker, causal)])
+
+    def state(self) -> dict[str, Any]:
+        """Return plain data, arrays and scans for `set_state`."""
+        tables = {"waiting": self._waiting, "beside": self._beside, "ready": self._ready}
+        return {
+            "decider": self._decider.state(),
+            "follower": tracker_state(self._follower),
+            "label": by_number(self._label, np.int64),
+            "whole": self._whole.state(),
+            "living": self._living,
+            "followed": [list(one) for one in self._followed],
+            "decided_s": self._decided_s,
+            "decisions": self._all_decided()._asdict(),
+            "links": self.links()._asdict(),
+            "logs_links": self.logs_links,
+            **{name: [table_state(one) for one in some] for name, some in tables.items()},
+        }
+
+    def set_state(self, state: dict[str, Any], tracker: ModelTracker) -> None:
+        """Go on from what `state` returned.
+
+        Args:
+            state: what it returned.
+            tracker: that made the causal pass.
+
+        Raises:
+            DataError: none can be in that state.
+        """
+        self._decider.set_state(state["decider"], tracker)
+        self._follower = tracker_of(state["follower"], tracker, smooths=True)
+        self._label = number_pairs(state["label"], least=1, most=np.iinfo(np.int64).max)
+        self._whole, self._living = _Whole.of_state(state["whole"]), ints(state["living"])
+        self._followed = [(ints(ids), floats(t, len(ids))) for ids, t in state["followed"]]
+        self._decided_s = real_number(state["decided_s"])
+        decided = _Decided(**state["decisions"])
+        count = len(floats(decided.t, -1))
+        self._decisions = [decided]
+        links = IdentityLinks(**state["links"])
+        pairs = len(ints(links.track_id))
+        for numbers, length in ((decided[1:3], count), (links[1:3], pairs)):
+            for column in numbers:
+                ints(column, length)
+        for values in (decided.probability, *links[3:7]):
+            floats(values, count if values is decided.probability else pairs)
+        floats(links.terms, pairs, len(TERMS))
+        self._links, self.logs_links = [links] if pairs else [], bool(state["logs_links"])
+        self._waiting, self._beside, self._ready = (
+            [table_of(one, tracker.sensor_names, decided=name == "ready") for one in state[name]]
+            for name in ("waiting", "beside", "ready")
+        )
 
     def settle(self) -> None:
         """Have the second smoother be as one that was saved and loaded."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,10 +21,11 @@ from jeat_graph.association.linking import TERMS, Past
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.identity_links import IdentityLinks
-from jeat_graph.tracking.identities import deciding
+from jeat_graph.tracking.identities import deciding, saved_parts
 from jeat_graph.tracking.identities.deciding import LONGEST_GAP_S, Recording, SoFar
 from jeat_graph.tracking.identities.passes import Pass, took
 from jeat_graph.tracking.identities.whole import measured_boxes
+from jeat_graph.tracking.identities.window_rows import WindowRows, continuing, one_piece_an_identity
 
 if TYPE_CHECKING:
     from jeat_graph.tracking.model_tracker import ModelTracker
@@ -39,46 +40,6 @@ _KEPT = 30
 _GAPS = 200
 # Identities that begin so soon after the first scan had begun before it (in times of scans).
 _AT_BEGINNING = 2.5
-
-
-class WindowRows(NamedTuple):
-    """Detections, in order of time.
-
-    Attributes:
-        number: (N,) of all, from 0.
-        t: (N,) time (s).
-        sensor: (N,) as the tracker counts them.
-        boxes: (N, 4) left, top, right, bottom (px), as they came.
-        causal: (N,) causal track that took each.
-        odds: (N,) log odds that this track is real then: of the causal pass, once decided of both.
-        owner: (N,) identity that was decided, 0 for nobody's, -1 before it is.
-    """
-
-    number: IntArray
-    t: FloatArray
-    sensor: IntArray
-    boxes: FloatArray
-    causal: IntArray
-    odds: FloatArray
-    owner: IntArray
-
-    def take(self, rows: IntArray | BoolArray) -> WindowRows:
-        """Return some of them."""
-        return WindowRows(
-            self.number[rows],
-            self.t[rows],
-            self.sensor[rows],
-            self.boxes[rows],
-            self.causal[rows],
-            self.odds[rows],
-            self.owner[rows],
-        )
-
-    @classmethod
-    def none(cls) -> WindowRows:
-        """Return no rows."""
-        none = np.zeros(0, dtype=np.int64)
-        return cls(none, np.zeros(0), none, np.zeros((0, 4)), none, np.zeros(0), none)
 
 
 class DecidedStep(NamedTuple):
@@ -179,6 +140,62 @@ class LagDecider:
         """Return whether something can be decided."""
         return bool(self._steps) and self._steps[-1].t >= self._next
 
+    def state(self) -> dict[str, Any]:
+        """Return plain data, arrays and scans for `set_state`."""
+        taken = [step.taken for step in self._steps]
+        return {
+            "steps": [step.batch for step in self._steps],
+            "assigned": np.concatenate([np.zeros(0, dtype=np.int64), *(one.assigned for one in taken)]),
+            "real": np.concatenate([np.zeros(0), *(one.real for one in taken)]),
+            "done": self._done,
+            "kept": self._kept._asdict(),
+            "count": saved_parts.by_number(self._count, np.int64),
+            "named": np.array(sorted(self._named), dtype=np.int64),
+            "past": self._past._asdict(),
+            "number": self._number,
+            "times": self._times,
+            "begun": self._begun,
+            "next": self._next,
+            "back": saved_parts.tracker_state(self._back),
+        }
+
+    def set_state(self, state: dict[str, Any], tracker: ModelTracker) -> None:
+        """Go on from what `state` returned.
+
+        Args:
+            state: what it returned.
+            tracker: that made the causal pass.
+
+        Raises:
+            DataError: no decider can be in that state.
+        """
+        whole_number, floats = saved_parts.whole_number, saved_parts.floats
+        sensors = tracker.engine_sensors
+        steps = saved_parts.steps_of(state["steps"], sensors)
+        ends = np.cumsum([0, *(sum(map(len, batch)) for batch in steps)]).tolist()
+        assigned = saved_parts.ints(state["assigned"], ends[-1])
+        real = floats(state["real"], ends[-1])
+        self._number, self._times = whole_number(state["number"]), whole_number(state["times"])
+        self._done, first = whole_number(state["done"], len(steps)), self._number - ends[-1]
+        self._steps = deque(
+            _Step(batch[0].t, batch, Pass(assigned[low:high], real[low:high]), first + low)
+            for batch, low, high in zip(steps, ends[:-1], ends[1:], strict=True)
+        )
+        undecided_s = steps[self._done][0].t if self._done < len(steps) else np.inf
+        self._kept = WindowRows.of_state(state["kept"], len(sensors), first + ends[self._done], undecided_s)
+        self._count = saved_parts.number_pairs(state["count"])
+        self._named = set(saved_parts.ints(state["named"]).tolist())
+        gaps = state["past"]["gaps"]
+        counts = {name: floats(state["past"][name], 2) for name in ("births", "leaving", "continued")}
+        self._past = Past(gaps=floats(gaps, -1)[-_GAPS:], **counts)
+        if min(*(one.min() for one in counts.values()), self._past.gaps.min(initial=0.0), first) < 0.0:
+            raise saved_parts.damaged("counts")
+        self._begun = None if state["begun"] is None else float(floats(np.array([state["begun"]]), 1)[0])
+        self._next = saved_parts.real_number(state["next"])
+        if (self._begun is None) != (not self._times) or (steps and tracker._model.picture() is None):
+            raise saved_parts.damaged("scans")
+        self._back = saved_parts.tracker_of(state["back"], tracker, smooths=False)
+
     def decide(
         self, tracker: ModelTracker, *, final: bool = False
     ) -> tuple[list[DecidedStep], IdentityLinks]:
@@ -212,8 +229,6 @@ class LagDecider:
         """Return who took the detections of the steps in the window on reversed time."""
         if self._back is None:
             self._back = tracker.fresh_copy(smooths=False)
-        else:
-            self._back.reset(0.0)
         first, now = self._steps[0].first, self._steps[-1].t
         assigned = np.zeros(self._number - first, dtype=np.int64)
         real = np.zeros(len(assigned))
@@ -222,6 +237,7 @@ class LagDecider:
             self._back.take_in([replace(scan, t=t, camera_motion=None) for scan in step.batch])
             at = slice(step.first - first, step.first - first + len(step.taken.assigned))
             assigned[at], real[at] = took(self._back, at.stop - at.start)
+        self._back.reset(0.0)  # only what it has learnt goes on, and is saved
         return Pass(assigned, real)
 
     def _rows(self, tracker: ModelTracker, back: Pass) -> tuple[WindowRows, IntArray, FloatArray]:
@@ -256,9 +272,9 @@ class LagDecider:
         """Return the best chains of what is in the window; what is decided stays as it is."""
         c = tracker.constants
         seen, scene = measured_boxes(tracker, rows.t, rows.sensor, rows.boxes)
-        assigned = np.stack([_continuing(rows, rows.causal), _continuing(rows, back)])
+        assigned = np.stack([continuing(rows, rows.causal), continuing(rows, back)])
         piece = agreement.pieces(agreement.SeenBoxes(rows.t, rows.sensor), assigned, deciding.AGREED)
-        piece = _one_piece_an_identity(piece, rows.owner)
+        piece = one_piece_an_identity(piece, rows.owner)
         pieces = int(piece.max(initial=-1)) + 1
         owner = np.zeros(pieces, dtype=np.int64)
         np.maximum.at(owner, piece, rows.owner)
@@ -386,35 +402,3 @@ def no_links() -> IdentityLinks:
     """Return none."""
     none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
     return IdentityLinks(none, none, none, nothing, nothing, nothing, nothing, np.zeros((0, len(TERMS))))
-
-
-def _continuing(rows: WindowRows, assigned: IntArray) -> IntArray:
-    """Return which track took each row (N,), below 0 where that is an identity that was decided.
-
-    A track continues the identity whose last detection is the track's own last one that is decided.
-    """
-    known, code = np.unique(assigned, return_inverse=True)
-    code = code.reshape(-1)
-    decided = np.flatnonzero(rows.owner > 0)
-    last = np.full(len(known), -1)
-    last[code[decided]] = decided  # in order of time: the last one counts
-    owners, which = np.unique(rows.owner[decided], return_inverse=True)
-    last_of_owner = np.full(len(owners), -1)
-    last_of_owner[which.reshape(-1)] = decided
-    identity = np.zeros(len(known), dtype=np.int64)
-    goes_on = np.isin(last, last_of_owner) & (last >= 0) & (known > 0)
-    identity[goes_on] = rows.owner[last[goes_on]]
-    out = np.where(identity[code] > 0, -identity[code], assigned)
-    return np.where(rows.owner > 0, -rows.owner, out)
-
-
-def _one_piece_an_identity(piece: IntArray, owner: IntArray) -> IntArray:
-    """Return pieces (N,), numbered by their first rows, with those of one identity made one."""
-    of = np.zeros(int(piece.max(initial=-1)) + 1, dtype=np.int64)
-    np.maximum.at(of, piece, owner)
-    first = np.arange(len(of))
-    order = np.arange(len(of))[::-1]
-    lowest = {int(of[k]): int(k) for k in order}
-    for k in np.flatnonzero(of > 0).tolist():
-        first[k] = lowest[int(of[k])]
-    return np.unique(first[piece], return_inverse=True)[1].reshape(-1).astype(np.int64)
