@@ -3,13 +3,17 @@
 // point numbers one by one (multiplications and additions stay apart in both).
 //
 // JEAT_GRAPH_TWICE is for what looks for bits, JEAT_GRAPH_WIDE for plain loops, which wider vectors alone make faster.
+// A function that has either is not inline: it is defined in a source, or static. What it calls exists twice only as a
+// part of it, JEAT_GRAPH_PART.
 #pragma once
 
 #if defined(__GNUC__) && !defined(__clang__) && defined(__x86_64__) && defined(__linux__) && \
     !defined(JEAT_GRAPH_SANITIZE)
 #define JEAT_GRAPH_TWICE __attribute__((target_clones("arch=haswell", "default")))
-#define JEAT_GRAPH_WIDE __attribute__((target_clones("avx2", "default"))) static
+#define JEAT_GRAPH_WIDE __attribute__((target_clones("avx2", "default")))
+#define JEAT_GRAPH_PART __attribute__((always_inline)) inline
 #else
 #define JEAT_GRAPH_TWICE
-#define JEAT_GRAPH_WIDE inline
+#define JEAT_GRAPH_WIDE
+#define JEAT_GRAPH_PART inline
 #endif

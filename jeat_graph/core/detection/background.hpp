@@ -22,7 +22,7 @@ inline constexpr float MORE_EVENTS = 2.0F;
 inline constexpr float FOLLOWED_SIGMAS = 1.0F, FOLLOWED_EVENTS = 0.5F;
 
 // Lets means follow the sums around; `kept` is -1 where a sum stands out, else 0.
-JEAT_GRAPH_WIDE void follow(const float* around, float* mean, const Usual& how, std::int32_t* kept,
+JEAT_GRAPH_WIDE static void follow(const float* around, float* mean, const Usual& how, std::int32_t* kept,
                             std::size_t size) {
     const auto [sigmas, quick, slow] = how;
     for (std::size_t k = 0; k < size; ++k) {

@@ -79,7 +79,7 @@ inline void or_few_rows(const std::uint64_t* bits, std::size_t rows, std::uint64
 }
 
 // The same with wider vectors, which pays where there are more rows than FEW_ROWS.
-JEAT_GRAPH_WIDE void or_many_rows(const std::uint64_t* bits, std::size_t rows, std::uint64_t* line,
+JEAT_GRAPH_WIDE static void or_many_rows(const std::uint64_t* bits, std::size_t rows, std::uint64_t* line,
                                   std::size_t words) {
     or_few_rows(bits, rows, line, words);
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "interruption.hpp"
 #include "tracking/life.hpp"
 
 namespace jeat::tracking {
