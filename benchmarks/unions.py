@@ -32,7 +32,9 @@ _LEAST_ROWS = 1000
 #: a third that is off by more than this share of a size, by more than the other.
 _FAILS, _BIASED, _FAILS_BIASED = 1.5, 0.1, 4.0
 _MUCH = 8.0
-OWN_SECOND, OWN_THIRD, ALL = "own + second", "own + third", "all"
+#: ANEES of position that is right enough.
+_HONEST = (0.7, 1.5)
+UNIONS = OWN_SECOND, OWN_THIRD, ALL = "own + second", "own + third", "all"
 
 
 class UnionJob(NamedTuple):
@@ -74,27 +76,36 @@ def judge_draw(job: UnionJob) -> dict[str, Any]:
     """Track with each detector alone and with the unions.
 
     Returns:
-        `recording`, the draw's parameters, and by union `best` (who is best alone) and `gain`: how much
-        better the union is in each score of `HEADLINE`.
+        `recording`, the draw's parameters, and by union `best` (who is best alone), `gain`: how much
+        better the union is in each score of `HEADLINE`, and `anees`: that of its positions.
     """
     draw = drawn_parameters(job.recording.name, job.number)
     recording = with_drawn_detectors(job.recording, draw)
     own = tuple(sorted(job.recording.detections.sensors))
-    alone = {name: _scores(recording, (name,)) for name in (*own, SECOND, THIRD)}
+    alone = {name: _headline(_scores(recording, (name,))) for name in (*own, SECOND, THIRD)}
     found: dict[str, Any] = {"recording": job.recording.name, **draw._asdict(), "unions": {}}
     for union, added in ((OWN_SECOND, (SECOND,)), (OWN_THIRD, (THIRD,)), (ALL, (SECOND, THIRD))):
         stream = (*own, *added)
         best = max(stream, key=lambda name: float(alone[name].sum()))
-        gain = _scores(recording, stream) - alone[best]
-        found["unions"][union] = {"best": best, "gain": dict(zip(HEADLINE, gain.tolist(), strict=True))}
+        scores = _scores(recording, stream)
+        gain = _headline(scores) - alone[best]
+        found["unions"][union] = {
+            "best": best,
+            "gain": dict(zip(HEADLINE, gain.tolist(), strict=True)),
+            "anees": scores.get("anees"),
+        }
     return found
 
 
-def _scores(recording: JudgedRecording, stream: Sequence[str]) -> np.ndarray[Any, Any]:
-    """Scores (3,) of `HEADLINE` of the causal table."""
+def _scores(recording: JudgedRecording, stream: Sequence[str]) -> dict[str, float | int]:
+    """Scores and consistency of the causal table."""
     ours = Contender("default", "default", ("smoother.engine=none",))
-    found = scores_of([recording], [tracked(ours, recording, stream)], stream)[CAUSAL]
-    return np.array([found[name] for name in HEADLINE])
+    return scores_of([recording], [tracked(ours, recording, stream)], stream)[CAUSAL]
+
+
+def _headline(scores: Mapping[str, float | int]) -> np.ndarray[Any, Any]:
+    """The scores (3,) of `HEADLINE`."""
+    return np.array([scores[name] for name in HEADLINE])
 
 
 def fails(draw: Mapping[str, Any], union: str) -> bool:
@@ -110,9 +121,10 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
 
     draws = result["draws"]
     digits = {**{f"{name} gained": 1 for name in HEADLINE}, "fail %": 0, "worse by 8 %": 0, "worst": 1}
-    by_union = [_row(draws, (union,), {"joined": union}) for union in (OWN_SECOND, OWN_THIRD, ALL)]
+    digits |= {"ANEES (median)": 2, "ANEES .7 to 1.5 (%)": 0}
+    by_union = [_row(draws, (union,), {"joined": union}) for union in UNIONS]
     by_way = [
-        _row([one for one in draws if one["way"] == way], (OWN_SECOND, OWN_THIRD, ALL), {"drawn": way})
+        _row([one for one in draws if one["way"] == way], UNIONS, {"drawn": way})
         for way in WAYS
         if any(one["way"] == way for one in draws)
     ]
@@ -129,6 +141,8 @@ def _row(
 ) -> dict[str, Cell]:
     gains = np.array([list(one["unions"][u]["gain"].values()) for one in draws for u in unions])
     worst = gains.min(axis=1)
+    anees = np.array([one["unions"][u].get("anees") or np.nan for one in draws for u in unions])
+    honest = (anees >= _HONEST[0]) & (anees <= _HONEST[1])
     return {
         **named,
         "unions": len(gains),
@@ -136,4 +150,6 @@ def _row(
         "fail %": 100.0 * float(np.mean([fails(one, u) for one in draws for u in unions])),
         "worse by 8 %": 100.0 * float(np.mean(worst < -_MUCH)),
         "worst": float(worst.min()),
+        "ANEES (median)": float(np.nanmedian(anees)),
+        "ANEES .7 to 1.5 (%)": 100.0 * float(honest.mean()),
     }

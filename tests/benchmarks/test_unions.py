@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.drawn_detectors import SECOND, THIRD, WAYS, Draw, drawn_parameters, with_drawn_detectors
+from benchmarks.judging import HEADLINE
 from benchmarks.recordings import JudgedRecording
-from benchmarks.unions import ALL, OWN_SECOND, OWN_THIRD, UnionJob, fails, judge_draw, tables
+from benchmarks.unions import ALL, OWN_SECOND, OWN_THIRD, UNIONS, UnionJob, fails, judge_draw, tables
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 
@@ -84,6 +85,7 @@ def test_a_union_is_judged_beside_the_best_alone():
     found = judge_draw(UnionJob(recording(), 0))
     assert set(found["unions"]) == {OWN_SECOND, OWN_THIRD, ALL}
     assert {one["best"] for one in found["unions"].values()} == {"cam"}  # it sees everything as it is
+    assert all(one["anees"] > 0.0 for one in found["unions"].values())
     shown = {key: table.render("text") for key, table in tables({"draws": [found]}).items()}
     assert OWN_THIRD in shown["unions"]
     assert found["way"] in shown["unions-ways"]
@@ -95,3 +97,14 @@ def test_a_union_is_judged_beside_the_best_alone():
 def test_a_third_that_is_off_may_cost_more(bias, worst, failed):
     draw = {"bias": bias, "unions": {OWN_THIRD: {"gain": {"MOTA": worst, "IDF1": 1.0}}}}
     assert fails(draw, OWN_THIRD) == failed
+
+
+def test_a_table_says_how_many_unions_are_honest_about_their_positions():
+    gain = dict.fromkeys(HEADLINE, 0.0)
+    draws = [
+        {"bias": 0.0, "way": "still", "unions": {key: {"gain": gain, "anees": anees} for key in UNIONS}}
+        for anees in (0.6, 1.0, 1.4, 3.0)
+    ]
+    header, first, *_ = tables({"draws": draws})["unions"].render("csv").splitlines()
+    shown = dict(zip(header.split(","), first.split(","), strict=True))
+    assert (float(shown["ANEES (median)"]), float(shown["ANEES .7 to 1.5 (%)"])) == (1.2, 50.0)
