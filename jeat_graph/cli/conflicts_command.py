@@ -15,6 +15,8 @@ from jeat_graph.data.errors import ConfigError
 
 if TYPE_CHECKING:
     from jeat_graph.road.conflicts.encounters import Encounter
+    from jeat_graph.road.conflicts.film import FilmFromAbove, FilmInPicture
+    from jeat_graph.road.conflicts.poses import Poses
 
 WRITES_INTO = ("out",)
 HELP = "find near misses on the road (TTC, DRAC, PET, headways), each with its interval and its doubt"
@@ -44,9 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--camera", metavar="CAMERA.yaml", help="draw the heat map in the camera's picture, not from above")
     add("--picture", metavar="FILE.png", help="a picture of the camera to draw it over (needs --camera)")
     add(
+        "--films",
+        action="store_true",
+        help="also draw a film of each conflict: in the camera's picture with --camera, else from above",
+    )
+    add(
         "--frames",
         metavar="VIDEO|DIR",
-        help="also write a film of each conflict from this video (needs --run)",
+        help="write the films from this video (needs --run)",
     )
     add("--run", dest="tracks", metavar="RUN", help="the run whose tracks the films show")
     add("--rate", type=positive, metavar="HZ", help="rate of frames that count only")
@@ -65,13 +72,16 @@ def run(args: argparse.Namespace) -> int:
     from jeat_graph.road.camera_file import read_camera
     from jeat_graph.road.conflicts.drawing import draw_heat
     from jeat_graph.road.conflicts.encounters import ConflictConfig, encounters, sure
+    from jeat_graph.road.conflicts.film import FilmFromAbove, FilmInPicture
     from jeat_graph.road.conflicts.poses import read_poses
     from jeat_graph.road.conflicts.tables import encounter_columns
 
     if args.picture is not None and args.camera is None:
         raise ConfigError("--picture says nothing without --camera: where the road is in it")
     if (args.frames is None) != (args.tracks is None):
-        raise ConfigError("films need both --frames and --run")
+        raise ConfigError(
+            "films from a video need both --frames and --run; --films draws them without a video"
+        )
     given = {"ttc_s": args.ttc, "drac": args.drac, "pet_s": args.pet, "most_doubt": args.doubt}
     config = ConflictConfig(**{name: value for name, value in given.items() if value is not None})
     later_s = clock_s(args.begin)
@@ -87,32 +97,48 @@ def run(args: argparse.Namespace) -> int:
     for name, own in (("conflicts.csv", surely), ("doubtful.csv", doubtful)):
         write_columns(with_clock(encounter_columns(own, later_s), args.begin), out / name)
     draw_heat(surely, vehicles, out / "conflicts.png", camera, args.picture)
-    if args.frames is not None:
-        _films(args, surely, out)
+    if args.frames is not None or args.films:
+        view = FilmInPicture(camera, args.picture) if camera is not None else FilmFromAbove()
+        _films(args, surely, vehicles, out, view)
     if doubtful:
         say("conflicts", f"{len(doubtful)} more may be conflicts, with more doubt (doubtful.csv)")
     print(f"{len(surely)} conflicts among {len(vehicles)} vehicles: {out}")
     return 0
 
 
-def _films(args: argparse.Namespace, found: list[Encounter], out: Path) -> None:
+def _films(
+    args: argparse.Namespace,
+    found: list[Encounter],
+    vehicles: list[Poses],
+    out: Path,
+    view: FilmInPicture | FilmFromAbove,
+) -> None:
+    from tqdm import tqdm
+
+    from jeat_graph.road.conflicts.film import write_film
+
+    hidden = not sys.stderr.isatty()
+    for one in tqdm(found, desc="films", unit="film", disable=hidden, leave=False):
+        path = out / f"conflict-{one.first}-{one.second}.webm"
+        if args.frames is None:
+            write_film(one, vehicles, path, _AROUND_S, view)
+        else:
+            _from_video(args, one, path)
+
+
+def _from_video(args: argparse.Namespace, one: Encounter, path: Path) -> None:
     from jeat_graph.drawing.movie.film import MovieWriter
     from jeat_graph.drawing.movie.sources import Request, open_movie
 
-    hidden = not sys.stderr.isatty()
-    from tqdm import tqdm
-
-    for one in tqdm(found, desc="films", unit="film", disable=hidden, leave=False):
-        request = Request(
-            run=Path(args.tracks),
-            frames=Path(args.frames),
-            frame_rate_hz=args.rate,
-            start_s=one.t - _AROUND_S,
-            end_s=one.t + _AROUND_S,
-        )
-        with ExitStack() as stack:
-            movie, rate_hz, _ = open_movie(request, stack)
-            path = out / f"conflict-{one.first}-{one.second}.webm"
-            with MovieWriter(path, movie.size_px, rate_hz) as writer:
-                for k in range(len(movie.times)):
-                    writer.append(movie.picture(k))
+    request = Request(
+        run=Path(args.tracks),
+        frames=Path(args.frames),
+        frame_rate_hz=args.rate,
+        start_s=one.t - _AROUND_S,
+        end_s=one.t + _AROUND_S,
+    )
+    with ExitStack() as stack:
+        movie, rate_hz, _ = open_movie(request, stack)
+        with MovieWriter(path, movie.size_px, rate_hz) as writer:
+            for k in range(len(movie.times)):
+                writer.append(movie.picture(k))

@@ -9,6 +9,9 @@ import pandas as pd
 import pytest
 
 from jeat_graph.cli.main import main
+from jeat_graph.drawing.palette import track_rgb
+from jeat_graph.road.camera import RoadCamera, mounted
+from jeat_graph.road.camera_file import write_camera
 from jeat_graph.road.conflicts.encounters import ConflictConfig, encounters, sure
 from jeat_graph.road.conflicts.measures import collision, encroachment, separation
 from jeat_graph.road.conflicts.poses import Poses
@@ -197,3 +200,63 @@ def test_a_road_of_points_has_no_sizes_and_is_refused(
     assert main(["conflicts", str(tmp_path / "road"), "--out", str(tmp_path / "out")]) == 2
     assert "make it from boxes" in capsys.readouterr().err
     assert not (tmp_path / "out" / "conflicts.csv").exists()
+
+
+def film_of(path: Path) -> list[np.ndarray]:
+    cv2 = pytest.importorskip("cv2")
+    capture, pictures = cv2.VideoCapture(str(path)), []
+    while (read := capture.read())[0]:
+        pictures.append(read[1][..., ::-1])
+    return pictures
+
+
+def coloured(picture: np.ndarray, track: int) -> np.ndarray:
+    """Pixels (x, y) of a vehicle's colour."""
+    off = np.abs(picture.astype(float) - track_rgb(track)).max(axis=2)
+    return np.argwhere(off < 40.0)[:, ::-1]
+
+
+@pytest.fixture
+def near_miss(tmp_path: Path) -> Path:
+    ahead = vehicle(1, 2.0, 40.0 + 10.0 * T, 10.0, 0.0)
+    close = np.minimum(T, 3.0)
+    behind = vehicle(2, 2.0, 10.0 * T + 10.0 * close, np.where(T < 3.0, 20.0, 10.0), 0.0)
+    write_road(tmp_path / "road", [ahead, behind])
+    return tmp_path
+
+
+def test_a_film_is_drawn_without_a_video(near_miss: Path) -> None:
+    out = near_miss / "out"
+    assert main(["conflicts", str(near_miss / "road"), "--films", "--out", str(out)]) == 0
+    pictures = film_of(out / "conflict-1-2.webm")
+    row = pd.read_csv(out / "conflicts.csv").iloc[0]
+    begin = max(row.t - 4.0, T[0])
+    assert len(pictures) == round((min(row.t + 4.0, T[-1]) - begin) * 20.0) + 1
+    for k in (10, 50):
+        middles = [coloured(pictures[k], track).mean(axis=0) for track in (1, 2)]
+        t = begin + k / 20.0
+        gap_m = 40.0 - 10.0 * min(t, 3.0)
+        # From above, driving upwards, 12 px a metre, both vehicles around the middle.
+        assert middles[0][1] - middles[1][1] == pytest.approx(-12.0 * gap_m, abs=4.0)
+        assert np.mean(middles, axis=0) == pytest.approx([360.0, 360.0], abs=4.0)
+
+
+def test_a_film_is_drawn_in_the_picture_of_the_camera(near_miss: Path) -> None:
+    pose = mounted(np.radians(14.0), 0.0, 0.0)
+    camera = RoadCamera(640, 360, 600.0, 600.0, 320.0, 180.0, 0.0, 0.0, pose, np.array([0.0, 0.0, 8.0]))
+    write_camera(camera, near_miss / "camera.yaml")
+    view, out = ["--camera", str(near_miss / "camera.yaml")], near_miss / "out"
+    assert main(["conflicts", str(near_miss / "road"), "--films", *view, "--out", str(out)]) == 0
+    picture = film_of(out / "conflict-1-2.webm")[20]
+    assert picture.shape[:2] == (camera.height, camera.width)
+    begin = max(pd.read_csv(out / "conflicts.csv").t[0] - 4.0, T[0])
+    true = camera.project(np.array([[2.0, 40.0 + 10.0 * (begin + 1.0), 0.0]]))[0][0]
+    assert coloured(picture, 1).mean(axis=0) == pytest.approx(true, abs=4.0)
+
+
+def test_films_of_a_video_say_what_else_draws_them(
+    near_miss: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(near_miss / "out")
+    assert main(["conflicts", str(near_miss / "road"), "--frames", "a.mp4", "--out", out]) == 2
+    assert "--films draws them without a video" in capsys.readouterr().err

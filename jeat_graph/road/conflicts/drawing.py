@@ -68,14 +68,23 @@ def draw_heat(
 Canvas = tuple[npt.NDArray[np.uint8], FloatArray, list[FloatArray]]
 
 
+def ground(camera: RoadCamera, picture: str | Path | None) -> npt.NDArray[np.uint8]:
+    """Return what a camera sees (H, W, 3): a picture of it, or grey.
+
+    Raises:
+        DataError: the picture cannot be read or is of another size.
+    """
+    if picture is None:
+        return np.full((camera.height, camera.width, 3), _GROUND, dtype=np.uint8)
+    read = read_picture(picture)
+    if read.shape[:2] != (camera.height, camera.width):
+        size = f"{read.shape[1]}x{read.shape[0]}, the camera is {camera.width}x{camera.height}"
+        raise DataError(f"is {size}", picture)
+    return np.ascontiguousarray(read)
+
+
 def _in_picture(camera: RoadCamera, vehicles: Sequence[Poses], picture: str | Path | None) -> Canvas:
-    canvas = np.full((camera.height, camera.width, 3), _GROUND, dtype=np.uint8)
-    if picture is not None:
-        read = read_picture(picture)
-        if read.shape[:2] != canvas.shape[:2]:
-            size = f"{read.shape[1]}x{read.shape[0]}, the camera is {camera.width}x{camera.height}"
-            raise DataError(f"is {size}", picture)
-        canvas = np.ascontiguousarray(read)
+    canvas = ground(camera, picture)
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
     places = camera.to_road(np.stack([x, y], axis=-1).reshape(-1, 2)).reshape(camera.height, camera.width, 2)
     ways = []
