@@ -10,7 +10,8 @@ its first detection by a backward information filter. With m⁻, P⁻ predicted 
 Apart, the piece is born: flat in place and ln size, with the velocities of a birth. The difference of both
 exponents, as a squared distance, is that of Student's t instead of the normal: as in association, errors have
 heavy tails. Detections measure centre and ln size of each axis (linear), with the covariance that their sides
-have: a side that the picture's edge cuts tells little, the other one as much as ever.
+have: a side that the picture's edge cuts tells little, the other one as much as ever. Places are those that a
+camera at rest would see: what the camera has moved until then is subtracted.
 """
 
 from __future__ import annotations
@@ -70,12 +71,14 @@ class MeasuredBoxes(NamedTuple):
         sensor: (N,) index.
         boxes: (N, 4) left, top, right, bottom (px).
         edges: (N, 2, 2) by axis and side, which end at the edge of the picture.
+        camera: (N, 2) how far the camera's motion had taken what is at rest (px).
     """
 
     t: FloatArray
     sensor: IntArray
     boxes: FloatArray
     edges: BoolArray
+    camera: FloatArray
 
 
 class PieceEnds(NamedTuple):
@@ -261,8 +264,8 @@ def _sizes(seen: MeasuredBoxes, hit: IntArray) -> FloatArray:
 
 
 def _measure(seen: MeasuredBoxes, hit: IntArray) -> FloatArray:
-    """Return centre and ln size (N, 2, 2) of detections, by axis."""
-    centre = (seen.boxes[hit, :2] + seen.boxes[hit, 2:]) / 2.0
+    """Return centre, as a camera at rest would see it, and ln size (N, 2, 2) of detections, by axis."""
+    centre = (seen.boxes[hit, :2] + seen.boxes[hit, 2:]) / 2.0 - seen.camera[hit]
     return np.stack([centre, np.log(_sizes(seen, hit))], axis=-1)
 
 
@@ -288,6 +291,7 @@ def _born(
     mean, P = box_sides.initial_state(
         boxes, np.zeros((len(hit), 2, 2), bool), 0.0, scene.log_scene_variance, c
     )
+    mean[..., POSITION] -= seen.camera[hit]
     R = _noise(seen, hit, size, scene, c)
     # What lasts of the error is in the box, too.
     for a, state, lasting in ((0, POSITION, POSITION_ERROR), (1, LOG_SIZE, SIZE_ERROR)):

@@ -126,6 +126,10 @@ class CoreModel(OneModel):
         """Return width and height of the picture (px), as far as is known."""
         return self._model.picture()
 
+    def camera_moved(self) -> FloatArray:
+        """Return how far the camera's motion has taken a point at rest (2,) (px)."""
+        return self._model.camera_moved()
+
     def boxes_end_at_edge(self) -> bool:
         """Return whether boxes end at the edge of the picture more often than they reach beyond it."""
         return self._model.boxes_end_at_edge()

@@ -34,7 +34,7 @@ from jeat_graph.tracking.heaps import Heaps
 from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.identities.lagging import LagSmoother
 from jeat_graph.tracking.identities.log import IdentityLog, counted
-from jeat_graph.tracking.identities.passes import Pass, took
+from jeat_graph.tracking.identities.passes import Pass, camera_moved, took
 from jeat_graph.tracking.input_watch import InputWatch
 from jeat_graph.tracking.model_measured import diagnostics_of
 from jeat_graph.tracking.model_saving import ModelSnapshot, SavedModel
@@ -118,7 +118,8 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         self._smooths = wanted and identities != "whole"
         self._log = IdentityLog() if wanted and identities == "whole" else None
         self._lag = LagSmoother(config.smoother) if wanted and identities == "lag" else None
-        self._counted: tuple[list[Scan], Pass] | None = None  # of the last step, where that is not None
+        # Of the last step, where that is not None.
+        self._counted: tuple[list[Scan], Pass, FloatArray] | None = None
         self._links: IdentityLinks | None = None
         self._model: TrackEngine = make_engine(config if self._smooths else unsmoothed(config), constants)
         if diagnostics and not self._model.has_fit:
@@ -253,9 +254,9 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         self._model.take(StepInput(t, *found[:4], similarity, surest_motion(batch), given))
         self._order, self._given, self._causal = found.order, count, None
         if self._log is not None:
-            self._log.add(batch, took(self, count), kept)
+            self._log.add(batch, took(self, count), camera_moved(self), kept)
         if self._lag is not None:
-            self._counted = counted(batch, took(self, count), kept)
+            self._counted = *counted(batch, took(self, count), kept), camera_moved(self)
         if self._diagnostics:
             sensor = sensors_of(batch, codes)[found.order]
             self._boxes = StepBoxes(t, sensor, found.boxes.copy())

@@ -96,6 +96,10 @@ class OneModel(SmoothsRecords):
         """Return what is believed of the sensors and the scene."""
 
     @abstractmethod
+    def camera_moved(self) -> FloatArray:
+        """Return how far the camera's motion has taken a point at rest (2,) (px)."""
+
+    @abstractmethod
     def tracks(self) -> Mapping[str, Any]:
         """Return the columns of the living tracks by name."""
 

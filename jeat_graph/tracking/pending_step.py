@@ -20,7 +20,8 @@ class PendingStep(NamedTuple):
         label: (N,) numbers of their classes, or None.
         share: (N,) of the votes that speak for these, or None.
         given: (N,) identities that the tables are to have in their place, or None.
-        batch: its scans, and which tracks took their detections, where identities are decided with a lag.
+        batch: its scans, which tracks took their detections, and how far the camera had moved (2,) (px), where
+            identities are decided with a lag.
     """
 
     record: Recorded
@@ -29,4 +30,4 @@ class PendingStep(NamedTuple):
     label: IntArray | None = None
     share: FloatArray | None = None
     given: IntArray | None = None
-    batch: tuple[list[Scan], Pass] | None = None
+    batch: tuple[list[Scan], Pass, FloatArray] | None = None

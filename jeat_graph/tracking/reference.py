@@ -194,6 +194,8 @@ def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:
     model = singer.discretise(dt, c)
     tracks = state.tracks
     F = singer.in_perspective(model.F, tracks.mean, dt, c)
+    if dt > 0.0:
+        state.camera_path = state.camera_path.predicted(model.F, state.camera_velocity, state.picture, dt)
     if dt > 0.0 and len(tracks):
         noise = state.process_noise, state.log_scene_variance(c)
         own, moves = picture_motion.before_prediction(tracks.mean, state.camera_velocity)
@@ -241,6 +243,7 @@ def follow_picture(
     noise = float(state.log_noise(c)[scan.sensor])
     if not camera_motion.contradicted(*seen, noise, moved, state.camera, c):
         state.tracks, state.camera_velocity = replace(tracks, mean=mean, covariance=covariance), velocity
+        state.camera_path = state.camera_path.with_picture(camera, velocity, state.picture, step_s)
 
 
 def surely_there(state: ReferenceState, c: ModelConstants) -> BoolArray:
@@ -264,6 +267,7 @@ def follow_camera(state: ReferenceState, scan: SensorScan, dt: float, c: ModelCo
             tracks.mean, tracks.covariance, motion, state.picture, dt, c
         )
         state.tracks = replace(tracks, mean=mean, covariance=covariance)
+        state.camera_path = state.camera_path.with_motion(motion, dt, c)
 
 
 def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> AssociatedPairs:

@@ -202,6 +202,10 @@ class ReferenceModel(OneModel):
         """Return the time of each sensor's (S,) last scan (s), NaN before it."""
         return self._state.last_scan_s
 
+    def camera_moved(self) -> FloatArray:
+        """Return how far the camera's motion has taken a point at rest (2,) (px)."""
+        return self._state.camera_path.moved
+
     def boxes_end_at_edge(self) -> bool:
         """Return whether boxes end at the edge of the picture more often than they reach beyond it."""
         state = self._state

@@ -21,6 +21,7 @@ from jeat_graph.filters import (
 from jeat_graph.filters.array_table import ArrayTable
 from jeat_graph.filters.box_sides import SIDES
 from jeat_graph.filters.camera_motion import CameraVariance
+from jeat_graph.filters.camera_path import CameraPath
 from jeat_graph.filters.evidence import Evidence
 from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
@@ -162,6 +163,7 @@ class ReferenceState:
         process_noise: of the scene. `learn_noise`
         camera: variances of the camera's motion. `follow_camera`
         camera_velocity: its velocity as the last picture showed it. `follow_picture`
+        camera_path: where its motion takes what is at rest. `predict`, `follow_picture`, `follow_camera`
         gaps: how gaps ended. `count_gaps`, and `end_tracks` for those that never end
         sensors: what is believed of each. `learn`; decision thresholds: `begin_scan`
         ended: evidence of the last tracks that ended. `end_tracks`
@@ -190,6 +192,7 @@ class ReferenceState:
     process_noise: ProcessNoise
     camera: CameraVariance
     camera_velocity: CameraVelocity
+    camera_path: CameraPath
     gaps: GapCounts
     sensors: SensorBelief
     ended: Evidence
@@ -240,6 +243,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         process_noise=singer.initial_process_noise(c),
         camera=camera_motion.initial_variance(c),
         camera_velocity=CameraVelocity.none(),
+        camera_path=CameraPath.none(),
         gaps=gap_survival.no_gaps(),
         sensors=SensorBelief(none, none, none, none, none, none, none, none, none, c.noise_share),
         ended=Evidence.none(0),

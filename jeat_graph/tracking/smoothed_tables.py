@@ -138,21 +138,21 @@ class SmoothedTables:
         return pieces
 
     def _decide_later(
-        self, batch: tuple[list[Scan], Pass] | None, ids: IntArray, given: IntArray | None
+        self, batch: tuple[list[Scan], Pass, FloatArray] | None, ids: IntArray, given: IntArray | None
     ) -> None:
         """Have identities of a step that the smoother was told of be decided with a lag, if they are.
 
         Args:
-            batch: its scans, and which tracks took their detections.
+            batch: its scans, which tracks took their detections, and how far the camera had moved (2,) (px).
             ids: (N,) the tracks after it.
             given: (N,) identities that the tables have in their place, or None.
         """
         if self._lag is None or batch is None:
             return
-        scans, taken = batch
+        scans, taken, camera = batch
         if given is not None:
             taken = taken._replace(assigned=given[np.searchsorted(ids, taken.assigned)])
-        self._lag.note(scans, taken, ids if given is None else given, self._tracker())
+        self._lag.note(scans, taken, camera, ids if given is None else given, self._tracker())
 
     def _check_smooths(self) -> None:
         if not self._smooths and self._log is None:

@@ -26,7 +26,8 @@ def detections(t, seed=0):
     centre = np.stack([100.0 + 40.0 * t, 200.0 - 10.0 * t], axis=1) + rng.normal(size=(len(t), 2))
     size = np.exp(np.log([30.0, 40.0]) + 0.02 * rng.normal(size=(len(t), 2)))
     boxes = np.concatenate([centre - size / 2, centre + size / 2], axis=1)
-    return MeasuredBoxes(t, np.zeros(len(t), dtype=int), boxes, np.zeros((len(t), 2, 2), dtype=bool))
+    edges, camera = np.zeros((len(t), 2, 2), dtype=bool), np.zeros((len(t), 2))
+    return MeasuredBoxes(t, np.zeros(len(t), dtype=int), boxes, edges, camera)
 
 
 def dense(mean, covariance, z, R, F, Q):
@@ -125,3 +126,20 @@ def test_a_birth_anywhere_in_a_larger_picture_is_less_likely():
     small = sum(log_birth(begun, SCENE, C))
     large = sum(log_birth(begun, SCENE._replace(picture=(1280.0, 960.0)), C))
     assert small - large == pytest.approx(np.log(4.0), abs=1e-3)
+
+
+@pytest.mark.parametrize("gap", [0.3, 4.0])
+def test_pieces_that_a_camera_moved_are_those_of_one_at_rest(gap):
+    seen, hits = parts(gap)
+    moved = np.random.default_rng(1).normal(0.0, 200.0, (len(seen.t), 2))
+    both = seen._replace(boxes=seen.boxes + np.tile(moved, 2), camera=moved)
+    unknown = both._replace(camera=np.zeros_like(moved))
+    ratio = [
+        log_ratio(
+            *(ends_of(one, hits, SCENE, C), np.array([0]), beginnings_of(one, hits, SCENE, C), np.array([1])),
+            *(SCENE, C),
+        )
+        for one in (seen, both, unknown)
+    ]
+    np.testing.assert_allclose(ratio[1], ratio[0], rtol=1e-9)
+    assert abs(ratio[2] - ratio[0]) > 5.0

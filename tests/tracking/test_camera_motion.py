@@ -9,6 +9,7 @@ import pytest
 
 from jeat_graph import Tracker, load_config
 from jeat_graph.data.detections import Detections, Scan
+from jeat_graph.tracking.identities.passes import camera_moved
 from jeat_graph.tracking.model_tracker import ModelTracker
 
 RATE, TIMES, PICTURE = 20.0, 120, (1600.0, 1200.0)
@@ -68,6 +69,34 @@ def test_causal_and_smoothed_tracks_are_those_of_a_camera_that_stands(engine):
     at = np.round(other.t * RATE).astype(int)
     np.testing.assert_allclose(other.mean[:, :2] - place[at], one.mean[:, :2], atol=0.6)
     np.testing.assert_allclose(other.var[:, :2], one.var[:, :2], rtol=0.2)
+
+
+def paths(given, engine):
+    """Where a point at rest has gone (TIMES, 2) in px."""
+    config = load_config("default", [f"image={{width: {PICTURE[0]}, height: {PICTURE[1]}}}"])
+    tracker, moved = ModelTracker(config, engine=engine), []
+    for scan in given:
+        tracker.step(scan)
+        moved.append(camera_moved(tracker))
+    return np.array(moved)
+
+
+def beyond_straight_on(path):
+    """How far (K, 2) points are after a second from where the half second before leads: that is what joins."""
+    half, whole = int(0.5 * RATE), int(RATE)
+    t = np.arange(half, len(path) - whole)
+    return path[t + whole] - path[t] - whole / half * (path[t] - path[t - half])
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_the_path_of_a_point_at_rest_is_the_cameras(told):
+    """A velocity that everything has in common cannot be told from the camera's, and joins no worse."""
+    place = jerks() if told else np.random.default_rng(2).normal(0.0, 8.0, (TIMES, 2))
+    path = paths(scans(place, told=told), "core")
+    # Boxes alone show the camera once there are tracks.
+    wrong, right = (np.sqrt((beyond_straight_on(one[20:]) ** 2).mean()) for one in (path - place, place))
+    assert wrong < 0.15 * right
+    np.testing.assert_allclose(paths(scans(place, told=told), "reference"), path, atol=1e-6)
 
 
 def test_velocities_are_those_in_the_picture():

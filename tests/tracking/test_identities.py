@@ -290,7 +290,8 @@ def test_weak_detections_go_with_their_causal_track_where_its_chain_is_free():
     from jeat_graph.smoothers.joining import MeasuredBoxes
 
     t = np.arange(6.0)
-    seen = MeasuredBoxes(t, np.zeros(6, dtype=int), np.zeros((6, 4)), np.zeros((6, 2, 2), dtype=bool))
+    edges, camera = np.zeros((6, 2, 2), dtype=bool), np.zeros((6, 2))
+    seen = MeasuredBoxes(t, np.zeros(6, dtype=int), np.zeros((6, 4)), edges, camera)
     causal = np.array([1, 1, 1, 2, 1, 1])
     # Weak ones first, in between, and last; that of track 2 is nobody's.
     assert with_weak(seen, causal, np.arange(6), np.array([-1, 4, -1, -1, 4, -1])).tolist() == [

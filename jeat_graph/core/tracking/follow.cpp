@@ -52,6 +52,7 @@ void CameraFollower::follow_picture(State& state, std::size_t sensor, const Corr
     if (contradicted(tracks_, moved_, scan.boxes, *scan.index, state.camera)) return;
     for (std::size_t i = 0; i < tracks.size(); ++i)
         follow(tracks.mean_of(i), tracks.covariance_of(i), changes_[i], *motion, camera, now);
+    state.camera_path.follow(camera, now, state.width, state.height, step_s);
     camera = now;
 }
 
@@ -63,6 +64,7 @@ void CameraFollower::follow_camera(State& state, std::size_t sensor, const Corre
         estimate_camera(tracks_, scan.boxes, *scan.index, state.width, state.height, dt, state.camera, c);
     if (!motion.known) return;
     const double lasting = (1.0 - exp_of(-dt / c.camera_time_s)) / dt;
+    state.camera_path.follow(motion, lasting);
     Tracks& tracks = state.tracks;
     for (std::size_t i = 0; i < tracks.size(); ++i)
         compensate(tracks.mean_of(i), tracks.covariance_of(i), motion, state.width, state.height, lasting);

@@ -266,6 +266,10 @@ public:
     std::size_t sensors() const { return now_.state.sensors.size(); }
     std::optional<double> time() const { return now_.state.started ? std::optional(now_.state.t) : std::nullopt; }
     std::tuple<double, double> picture() const { return {now_.state.width, now_.state.height}; }
+    Out<double> camera_moved() const {
+        const auto& moved = now_.state.camera_path.moved;
+        return array_of(std::vector<double>(moved.begin(), moved.end()));
+    }
     Out<double> last_scans() const {
         std::vector<double> out;
         for (const Sensor& sensor : now_.state.sensors) out.push_back(sensor.last_scan_s);
@@ -471,6 +475,7 @@ void bind(nb::module_& module) {
         .def("sensors", exclusive(&Model::sensors), "Number of sensors.")
         .def("time", exclusive(&Model::time), "Time of the last step (s); None before the first.")
         .def("picture", exclusive(&Model::picture), "Width and height of the picture (px), as far as is known.")
+        .def("camera_moved", exclusive(&Model::camera_moved), "How far the camera's motion has taken a point at rest (2,) (px).")
         .def("last_scans", exclusive(&Model::last_scans), "Time of each sensor's last scan (s), NaN before it.")
         .def("__deepcopy__", [](Model& model, const nb::object&) {
                  const Exclusive::Hold hold(model.use);

@@ -165,8 +165,8 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
 }
 
 template <class Visitor> void visit_state(Visitor& v, State& state) {
-    auto& [constants, tracks, t, started, next_id, width, height, picture_known, process_noise, camera, camera_velocity, gaps,
-           belief, offsets, accuracy, log_side_variance, sensors, ended, learnt_s] = state;
+    auto& [constants, tracks, t, started, next_id, width, height, picture_known, process_noise, camera, camera_velocity, camera_path,
+           gaps, belief, offsets, accuracy, log_side_variance, sensors, ended, learnt_s] = state;
     (void)constants;  // the caller's
     std::size_t S = sensors.size(), rows = tracks.size(), ended_rows = ended.size();
     v.whole("sensors", S);
@@ -198,6 +198,9 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     v.numbers("camera.rate", rate.theta.data(), rate.theta.size());
     v.numbers("camera.picture_s", &picture_s, 1, Values::any);
     v.numbers("camera.until_s", &until_s, 1, Values::any);
+    auto& [moved, velocity] = camera_path;
+    v.numbers("camera.moved", moved.data(), moved.size());
+    v.numbers("camera.velocity", velocity.data(), velocity.size());
     auto& [gaps_ended, ended_well] = gaps;
     v.numbers("gaps.ended", gaps_ended.data(), gaps_ended.size());
     v.numbers("gaps.ended_well", ended_well.data(), ended_well.size());

@@ -11,6 +11,7 @@
 
 #include "filters/box_sides.hpp"
 #include "filters/camera_motion.hpp"
+#include "filters/camera_path.hpp"
 #include "filters/columns.hpp"
 #include "filters/evidence.hpp"
 #include "filters/gap_survival.hpp"
@@ -118,6 +119,7 @@ struct State {
     ProcessNoise process_noise;     // learn_noise
     CameraVariance camera;          // follow_camera
     CameraVelocity camera_velocity; // follow_picture
+    CameraPath camera_path;         // predict, follow_picture, follow_camera
     GapCounts gaps;                 // count_gaps, end_tracks
     SensorBelief belief;            // learn
     OffsetSums offsets;             // compare_sensors

@@ -71,6 +71,7 @@ void predict(State& state, double t, TimeStep& step) {
     state.started = true;
     step.set(dt, c);
     if (dt <= 0.0) return;
+    state.camera_path.predict(step.motion().F, state.camera_velocity, state.width, state.height, dt);
     const Densities densities(state.process_noise, exp_of(state.log_scene_variance()));
     Tracks& tracks = state.tracks;
     for (std::size_t i = 0; i < tracks.size(); ++i) {

@@ -307,7 +307,7 @@ def at_rim(boxes: FloatArray, picture: tuple[float, float]) -> BoolArray:
 def _candidates(seen: MeasuredBoxes, first: IntArray, last: IntArray) -> tuple[IntArray, IntArray]:
     """Return pairs of pieces that follow each other in time, and lie near enough to be one."""
     begins, ends = seen.t[first], seen.t[last]
-    centre = (seen.boxes[:, :2] + seen.boxes[:, 2:]) / 2.0
+    centre = (seen.boxes[:, :2] + seen.boxes[:, 2:]) / 2.0 - seen.camera
     lengths = seen.boxes[:, 2:] - seen.boxes[:, :2]
     size, log_size = np.sqrt(lengths.prod(axis=1)), np.log(lengths)
     order = np.argsort(begins, kind="stable")

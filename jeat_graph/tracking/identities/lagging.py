@@ -155,17 +155,25 @@ class LagSmoother:
         self._decisions: list[_Decided] = []
         self._links: list[IdentityLinks] = []
 
-    def note(self, batch: Sequence[Scan], taken: Pass, living: IntArray, tracker: ModelTracker) -> None:
+    def note(
+        self,
+        batch: Sequence[Scan],
+        taken: Pass,
+        camera: FloatArray,
+        living: IntArray,
+        tracker: ModelTracker,
+    ) -> None:
         """Take in a step of the tracker.
 
         Args:
             batch: its scans.
             taken: who took their detections (M,), by the identities that rows have.
+            camera: (2,) how far the camera's motion has taken what is at rest (px).
             living: (N,) these of the tracks after it.
             tracker: that took it.
         """
         self._living = living
-        self._decider.add(batch, taken)
+        self._decider.add(batch, taken, camera)
         if self._decider.is_due():
             self._decide(tracker)
 

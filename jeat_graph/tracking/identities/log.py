@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import BoolArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.scan import trusted_scan
@@ -23,16 +23,21 @@ class IdentityLog:
     def __init__(self) -> None:
         self._parts: list[tuple[Detections, Pass]] = []
         self._scans: list[Scan] = []
+        self._camera: list[FloatArray] = []
         self._passes: list[Pass] = []
 
-    def add(self, batch: Sequence[Scan], taken: Pass, kept: BoolArray | None = None) -> None:
+    def add(
+        self, batch: Sequence[Scan], taken: Pass, camera: FloatArray, kept: BoolArray | None = None
+    ) -> None:
         """Take down the scans of a step.
 
         Args:
             batch: the scans.
             taken: which tracks took their detections (M,), in the same order.
+            camera: (2,) how far the camera's motion has taken what is at rest (px).
             kept: (M,) which of these count; None where all do. The others are left out.
         """
+        self._camera.append(camera)
         batch, taken = counted(batch, taken, kept)
         self._scans += batch
         self._passes.append(taken)
@@ -40,7 +45,7 @@ class IdentityLog:
             self._pack()
 
     def recording(self) -> tuple[Detections, Pass]:
-        """Return all detections, and the causal pass in their order."""
+        """Return all detections (N,), and the causal pass in their order."""
         self._pack()
         if len(self._parts) > 1:
             whole = Detections.concatenate([one for one, _ in self._parts])
@@ -48,10 +53,15 @@ class IdentityLog:
             self._parts = [(whole, _joined([one for _, one in self._parts], _order_of(t, names)))]
         return self._parts[0] if self._parts else (Detections.from_scans([]), _joined([], np.zeros(0, int)))
 
+    def camera(self) -> FloatArray:
+        """Return how far the camera had moved at each of the T times of scans (T, 2) (px)."""
+        return np.concatenate([np.zeros((0, 2)), *(one.reshape(-1, 2) for one in self._camera)])
+
     def state(self) -> dict[str, Any]:
         """Return what `from_state` takes, plain data and `Detections`."""
         detections, taken = self.recording()
-        return {"detections": detections, "assigned": taken.assigned, "real": taken.real}
+        causal = {"assigned": taken.assigned, "real": taken.real}
+        return {"detections": detections, **causal, "camera": self.camera()}
 
     @classmethod
     def from_state(cls, state: dict[str, Any]) -> IdentityLog:
@@ -63,13 +73,15 @@ class IdentityLog:
         log, taken = cls(), Pass(state["assigned"], state["real"])
         # Made anew, so that scans are checked as those of a user.
         detections = Detections.from_scans(Scan(**vars(scan)) for scan in state["detections"].scans())
-        shape = (len(detections),)
+        camera, shape = state["camera"], (len(detections),)
+        if camera.shape != (len(np.unique(detections.scan_t)), 2) or not np.isfinite(camera).all():
+            raise DataError("is damaged: it does not say where the camera was at each time")
         if taken.assigned.shape != shape or taken.assigned.dtype != np.int64 or taken.real.shape != shape:
             raise DataError("is damaged: its detections are not those that tracks took")
         if (taken.assigned < 0).any() or not ((taken.real >= 0.0) & (taken.real <= 1.0)).all():
             raise DataError("is damaged: its detections were taken by no tracks")
         if detections.num_scans:
-            log._parts = [(detections, taken)]
+            log._parts, log._camera = [(detections, taken)], [camera]
         return log
 
     def _pack(self) -> None:

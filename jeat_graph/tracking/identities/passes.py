@@ -12,6 +12,8 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.progress import with_progress
 from jeat_graph.filters.model_constants import ModelConstants
+from jeat_graph.tracking.engine import lacking
+from jeat_graph.tracking.one_model import OneModel
 
 if TYPE_CHECKING:
     from jeat_graph.tracking.model_tracker import ModelTracker
@@ -36,6 +38,14 @@ def took(tracker: ModelTracker, number: int) -> Pass:
     out, found = np.zeros(number), assigned > 0
     out[found] = real[np.searchsorted(living, assigned[found])]
     return Pass(assigned, out)
+
+
+def camera_moved(tracker: ModelTracker) -> FloatArray:
+    """Return how far the camera's motion has taken a point at rest (2,) (px)."""
+    model = tracker._model
+    if not isinstance(model, OneModel):
+        raise lacking(model.name, "does not say how the camera moved")
+    return model.camera_moved()
 
 
 def one_pass(

@@ -41,7 +41,7 @@ def decided(tracker: ModelTracker, log: IdentityLog) -> tuple[IdentityLinks, Ite
     detections, causal = log.recording()
     with progress_span(0.0, _BACKWARD):
         backward = one_pass(detections, tracker, tracker.constants, backward=True)
-    recording = _recording(tracker, detections)
+    recording = _recording(tracker, detections, log.camera())
     decision = decide(recording, [causal, backward], backward, tracker.constants)
     rows = retrack(detections, decision, backward.real, tracker)
     return _links(decision, recording.measured.t), pieces_in_span(_DECIDED, 1.0, rows)
@@ -62,8 +62,14 @@ def _links(decision: IdentityDecision, t: FloatArray) -> IdentityLinks:
     )
 
 
-def _recording(tracker: ModelTracker, detections: Detections) -> Recording:
-    """Return what is known of detections at the end of the causal pass, in the model's own numbers."""
+def _recording(tracker: ModelTracker, detections: Detections, camera: FloatArray) -> Recording:
+    """Return what is known of detections at the end of the causal pass, in the model's own numbers.
+
+    Args:
+        tracker: of that pass.
+        detections: all scans.
+        camera: (T, 2) how far the camera had moved at each of their times (px).
+    """
     count = np.diff(detections.scan_start)
     numbers = np.array([tracker.engine_sensors.index(name) for name in detections.sensors], dtype=np.int64)
     sensor = numbers[np.repeat(detections.scan_sensor, count)]
@@ -71,12 +77,13 @@ def _recording(tracker: ModelTracker, detections: Detections) -> Recording:
         [detections.boxes[:, :2], detections.boxes[:, :2] + detections.boxes[:, 2:]], axis=1
     )
     t = np.repeat(detections.scan_t, count)
-    measured, scene = measured_boxes(tracker, t, sensor, boxes)
-    return Recording(measured, np.unique(detections.scan_t), scene, detections.embeddings)
+    times, at = np.unique(detections.scan_t, return_inverse=True)
+    measured, scene = measured_boxes(tracker, t, sensor, boxes, camera[np.repeat(at, count)])
+    return Recording(measured, times, scene, detections.embeddings)
 
 
 def measured_boxes(
-    tracker: ModelTracker, t: FloatArray, sensor: IntArray, boxes: FloatArray
+    tracker: ModelTracker, t: FloatArray, sensor: IntArray, boxes: FloatArray, camera: FloatArray
 ) -> tuple[MeasuredBoxes, LearntScene]:
     """Return detections as the model sees them, by what it has learnt so far, and that.
 
@@ -85,6 +92,7 @@ def measured_boxes(
         t: (N,) times (s).
         sensor: (N,) as the tracker counts them.
         boxes: (N, 4) left, top, right, bottom in the common picture (px).
+        camera: (N, 2) how far the camera's motion had taken what is at rest (px).
     """
     model, c = tracker._model, tracker.constants
     if not isinstance(model, OneModel):
@@ -104,4 +112,4 @@ def measured_boxes(
         learnt.log_scene_variance,
         picture,
     )
-    return MeasuredBoxes(t, sensor, boxes, edges), scene
+    return MeasuredBoxes(t, sensor, boxes, edges, camera), scene

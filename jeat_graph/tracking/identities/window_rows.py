@@ -21,6 +21,7 @@ class WindowRows(NamedTuple):
         causal: (N,) causal track that took each.
         odds: (N,) log odds that this track is real then: of the causal pass, once decided of both.
         owner: (N,) identity that was decided, 0 for nobody's, -1 before it is.
+        camera: (N, 2) how far the camera's motion had taken what is at rest (px).
     """
 
     number: IntArray
@@ -30,6 +31,7 @@ class WindowRows(NamedTuple):
     causal: IntArray
     odds: FloatArray
     owner: IntArray
+    camera: FloatArray
 
     def take(self, rows: IntArray | BoolArray) -> WindowRows:
         """Return some of them."""
@@ -41,6 +43,7 @@ class WindowRows(NamedTuple):
             self.causal[rows],
             self.odds[rows],
             self.owner[rows],
+            self.camera[rows],
         )
 
     @classmethod
@@ -67,6 +70,7 @@ class WindowRows(NamedTuple):
             ints(state["causal"], count),
             floats(state["odds"], count),
             ints(state["owner"], count, least=1),
+            floats(state["camera"], count, 2),
         )
         sound = (
             (rows.boxes[:, 2:] >= rows.boxes[:, :2]).all()
@@ -81,7 +85,7 @@ class WindowRows(NamedTuple):
     def none(cls) -> WindowRows:
         """Return no rows."""
         none = np.zeros(0, dtype=np.int64)
-        return cls(none, np.zeros(0), none, np.zeros((0, 4)), none, np.zeros(0), none)
+        return cls(none, np.zeros(0), none, np.zeros((0, 4)), none, np.zeros(0), none, np.zeros((0, 2)))
 
 
 def continuing(rows: WindowRows, assigned: IntArray) -> IntArray:

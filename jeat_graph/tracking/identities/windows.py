@@ -69,6 +69,7 @@ class _Step:
     t: float
     batch: list[Scan]
     taken: Pass
+    camera: FloatArray
     first: int
 
 
@@ -114,13 +115,19 @@ class LagDecider:
     _next: float = 0.0
     _back: ModelTracker | None = None
 
-    def add(self, batch: Sequence[Scan], taken: Pass) -> None:
-        """Take down a step, and which causal tracks took its detections (M,), with their posteriors."""
+    def add(self, batch: Sequence[Scan], taken: Pass, camera: FloatArray) -> None:
+        """Take down a step.
+
+        Args:
+            batch: its scans.
+            taken: which causal tracks took its detections (M,), with their posteriors.
+            camera: (2,) how far the camera's motion has taken what is at rest (px).
+        """
         t = float(batch[0].t)
         if self._begun is None:
             self._begun, self._next = t, t + self.lag_s
         self._times += 1
-        self._steps.append(_Step(t, list(batch), taken, self._number))
+        self._steps.append(_Step(t, list(batch), taken, camera, self._number))
         self._number += len(taken.assigned)
 
     def reset(self) -> None:
@@ -147,6 +154,7 @@ class LagDecider:
             "steps": [step.batch for step in self._steps],
             "assigned": np.concatenate([np.zeros(0, dtype=np.int64), *(one.assigned for one in taken)]),
             "real": np.concatenate([np.zeros(0), *(one.real for one in taken)]),
+            "camera": np.array([step.camera for step in self._steps]).reshape(-1, 2),
             "done": self._done,
             "kept": self._kept._asdict(),
             "count": saved_parts.by_number(self._count, np.int64),
@@ -174,12 +182,12 @@ class LagDecider:
         steps = saved_parts.steps_of(state["steps"], sensors)
         ends = np.cumsum([0, *(sum(map(len, batch)) for batch in steps)]).tolist()
         assigned = saved_parts.ints(state["assigned"], ends[-1])
-        real = floats(state["real"], ends[-1])
+        real, camera = floats(state["real"], ends[-1]), floats(state["camera"], len(steps), 2)
         self._number, self._times = whole_number(state["number"]), whole_number(state["times"])
         self._done, first = whole_number(state["done"], len(steps)), self._number - ends[-1]
         self._steps = deque(
-            _Step(batch[0].t, batch, Pass(assigned[low:high], real[low:high]), first + low)
-            for batch, low, high in zip(steps, ends[:-1], ends[1:], strict=True)
+            _Step(batch[0].t, batch, Pass(assigned[low:high], real[low:high]), moved, first + low)
+            for batch, moved, low, high in zip(steps, camera, ends[:-1], ends[1:], strict=True)
         )
         undecided_s = steps[self._done][0].t if self._done < len(steps) else np.inf
         self._kept = WindowRows.of_state(state["kept"], len(sensors), first + ends[self._done], undecided_s)
@@ -257,6 +265,7 @@ class LagDecider:
                     step.taken.assigned,
                     deciding.log_odds(step.taken.real),
                     np.full(count, -1, dtype=np.int64),
+                    np.broadcast_to(step.camera, (count, 2)),
                 )
             )
         rows = WindowRows(*(np.concatenate(columns) for columns in zip(self._kept, *parts, strict=True)))
@@ -271,7 +280,7 @@ class LagDecider:
     def _choose(self, tracker: ModelTracker, rows: WindowRows, back: IntArray, later: FloatArray) -> _Choice:
         """Return the best chains of what is in the window; what is decided stays as it is."""
         c = tracker.constants
-        seen, scene = measured_boxes(tracker, rows.t, rows.sensor, rows.boxes)
+        seen, scene = measured_boxes(tracker, rows.t, rows.sensor, rows.boxes, rows.camera)
         assigned = np.stack([continuing(rows, rows.causal), continuing(rows, back)])
         piece = agreement.pieces(agreement.SeenBoxes(rows.t, rows.sensor), assigned, deciding.AGREED)
         piece = one_piece_an_identity(piece, rows.owner)
