@@ -1,8 +1,9 @@
 """Where the camera's motion has taken a point at rest that was in the middle of the picture.
 
 Tracks follow the camera step by step; whoever compares boxes of different times, as one who joins pieces of
-tracks does, subtracts this path from both. It moves as a track there would: by what pictures show, by what all
-tracks have in common, and by what lasts of that, which is part of the tracks' velocities (`camera_motion`).
+tracks does, subtracts this path from both. It moves as a track there would: by what pictures show, by what
+all tracks have in common, and by what lasts of that, which is part of the tracks' velocities
+(`camera_motion`).
 """
 
 from __future__ import annotations

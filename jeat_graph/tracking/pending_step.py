@@ -20,8 +20,8 @@ class PendingStep(NamedTuple):
         label: (N,) numbers of their classes, or None.
         share: (N,) of the votes that speak for these, or None.
         given: (N,) identities that the tables are to have in their place, or None.
-        batch: its scans, which tracks took their detections, and how far the camera had moved (2,) (px), where
-            identities are decided with a lag.
+        batch: where identities are decided with a lag, its scans, which tracks took their detections, and how
+            far the camera had moved (2,) (px).
     """
 
     record: Recorded

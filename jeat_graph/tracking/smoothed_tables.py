@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph.data.corrected_tracks import CorrectedTracks, Disagreements
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import JeatGraphError

@@ -82,7 +82,7 @@ def paths(given, engine):
 
 
 def beyond_straight_on(path):
-    """How far (K, 2) points are after a second from where the half second before leads: that is what joins."""
+    """How far (K, 2) points are after a second from where the half second before leads: what joins."""
     half, whole = int(0.5 * RATE), int(RATE)
     t = np.arange(half, len(path) - whole)
     return path[t + whole] - path[t] - whole / half * (path[t] - path[t - half])

@@ -17,7 +17,7 @@ from jeat_graph.data.errors import ConfigError
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.live.service.checking import tracker_config
 from jeat_graph.live.service.config import TrackedBy
-from jeat_graph.tracking.identities.passes import took
+from jeat_graph.tracking.identities.passes import camera_moved, took
 from jeat_graph.tracking.identities.window_rows import WindowRows, continuing, one_piece_an_identity
 from jeat_graph.tracking.identities.windows import LagDecider
 
@@ -105,7 +105,7 @@ def decided(scans, final=True):
     tracker, decider, out = Tracker(load_config("default", SIZE)), LagDecider(1.0), []
     for scan in scans:
         tracker.step(scan)
-        decider.add([scan], took(tracker, len(scan)))
+        decider.add([scan], took(tracker, len(scan)), camera_moved(tracker))
         if decider.is_due():
             out += decider.decide(tracker)[0]
     out += decider.decide(tracker, final=True)[0] if final else []
@@ -187,9 +187,8 @@ def test_a_track_goes_on_with_the_identity_whose_last_detection_it_has():
     causal = np.array([1, 2, 1, 2, 1, 2, 3])
     owner = np.array([10, 20, 20, 10, -1, -1, -1])
     n = len(causal)
-    rows = WindowRows(
-        np.arange(n), np.arange(n) / 10.0, np.zeros(n, int), np.zeros((n, 4)), causal, np.zeros(n), owner
-    )
+    number, t, sensor = np.arange(n), np.arange(n) / 10.0, np.zeros(n, int)
+    rows = WindowRows(number, t, sensor, np.zeros((n, 4)), causal, np.zeros(n), owner, np.zeros((n, 2)))
     assert continuing(rows, causal).tolist() == [-10, -20, -20, -10, -20, -10, 3]
     # A track whose identity went on with another one in the meantime continues nothing.
     rows = rows._replace(owner=np.array([10, 20, 10, 10, -1, -1, -1]))
