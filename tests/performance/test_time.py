@@ -8,8 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks.speed_scene import make_frames
 from benchmarks.speed_subjects import installed_peers
 from benchmarks.speed_timing import summarise, time_side_by_side
+from jeat_graph import Tracker, load_config
 from jeat_graph.data.events import EventArray
 from jeat_graph.data.trajectories import GroundTruth, Trajectories
 from jeat_graph.eval.metrics import evaluate
@@ -72,6 +74,24 @@ def test_a_window_costs_no_more_after_a_minute(least):
     )
     assert late < 1.5 * early
     assert old.tracker.smoother_counts["fallbacks"] == 0
+
+
+def test_deciding_with_the_whole_recording_takes_less_than_six_times_as_long_as_smoothing(least):
+    """4 to 5 measured: four passes of the model, of which two are smoothed, and the decision itself."""
+    frames = make_frames(30, 200, 20.0, seed=0)
+    # Nobody is seen for two seconds, so that there is something to be joined.
+    scans = [(one.t, "rgb", one.boxes, one.scores) for k, one in enumerate(frames) if not 90 <= k < 130]
+
+    def run(identities):
+        tracker = Tracker(load_config("default", [f"smoother.identities={identities}"]), image=(3840, 2160))
+        for scan in scans:
+            tracker.step(scan)
+        assert len(tracker.finish()) > 0
+
+    causal, whole = least(
+        lambda: run("causal"), lambda: run("whole"), until=lambda causal, whole: whole < 6.0 * causal
+    )
+    assert whole < 6.0 * causal
 
 
 def test_judging_takes_no_longer_per_frame_where_there_are_more(least):
