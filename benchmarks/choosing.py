@@ -25,9 +25,11 @@ class NamedMove(Protocol[_Point]):
     @property
     def name(self) -> str:
         """Of the parameter."""
+        ...
 
     def __call__(self, point: _Point, /) -> _Point:
         """Return the changed point."""
+        ...
 
 
 class Gain(NamedTuple):

@@ -110,7 +110,7 @@ def _sent(sinks: list[Sink], pid: int, web: int, args: argparse.Namespace) -> di
     )
     camera, origin = a_camera(), time.time()
     memory: list[float] = []
-    cpu = np.nan
+    cpu = begun = np.nan
     for k in range(int(total_s * args.rate)):
         t = k / args.rate
         time.sleep(max(origin + t - time.time(), 0.0))

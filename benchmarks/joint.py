@@ -201,10 +201,11 @@ def demo_scores(preset: str, order: Sequence[str] | None, digits: int) -> dict[s
     pairs = both = 0
     for batch in rounded.batches():
         fed: set[int] = set()
+        answers = []
         for scans in _steps(batch, order):
-            table = tracker.step(scans)
+            answers.append(tracker.step(scans))
             fed |= set(tracker.assigned(sum(map(len, scans))).tolist())
-        tables.append(table)  # the answer of a time is that after its last scan
+        tables.append(answers[-1])  # the answer of a time is that after its last scan
         if preset == "paper" and len(batch) > 1:
             one, other = _twins(tracker)
             pairs += len(one)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import configparser
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -220,7 +220,8 @@ def _read(one: FoundRecording, how: LayoutOptions) -> JudgedRecording:
     if one.reader is not None:
         truth = one.reader(one.truth)
     else:
-        truth = read_truth(one.truth, fmt=one.forms[0], **({} if one.truth.suffix == ".csv" else options))
+        of_truth: dict[str, Any] = {} if one.truth.suffix == ".csv" else options
+        truth = read_truth(one.truth, fmt=one.forms[0], **of_truth)
     if how.classes:
         truth = restrict_classes(truth, how.classes)
     parts: list[Detections] = []
@@ -293,5 +294,7 @@ def _meta(path: Path) -> dict[str, Any]:
 
 
 def _image(facts: dict[str, Any]) -> tuple[float, float] | None:
-    sizes: Sequence[Any] = (facts.get("width"), facts.get("height"))
-    return (float(sizes[0]), float(sizes[1])) if all(isinstance(one, int | float) for one in sizes) else None
+    width, height = facts.get("width"), facts.get("height")
+    if isinstance(width, int | float) and isinstance(height, int | float):
+        return float(width), float(height)
+    return None

@@ -67,6 +67,7 @@ def detectors_of(args: argparse.Namespace) -> dict[str, list[dict[str, Any]]]:
 
 def _asked(args: argparse.Namespace) -> list[tuple[str, str, list[str]]]:
     """Return sensors with what they look at and the detectors asked for."""
+    asked: list[tuple[str, str, list[str]]]
     asked = list(zip(SENSORS, KINDS, (args.frames, args.events), strict=True))
     return [*asked, (FUSED_SENSOR, FUSED, args.fused)] if args.fused else asked
 

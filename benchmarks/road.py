@@ -135,7 +135,7 @@ def simulated_table(rows: Sequence[Mapping[str, Any]]) -> Table:
         record["speed_median_kmh"] = float(np.average([r["speed_median_kmh"] for r in own], weights=weight))
         record |= {name: float(np.average([r[name] for r in own], weights=weight)) for name in means}
         records.append(record)
-    digits = dict.fromkeys(("across_held", "along_held", "speed_held", "speed_known"), 1)
+    digits: dict[str, int] = dict.fromkeys(("across_held", "along_held", "speed_held", "speed_known"), 1)
     title = (
         "Simulated highway, 20 to 100 m (nees: 1 where honest; held: % of the 95 % intervals; known: % of "
         "the rows that state a speed)"

@@ -66,17 +66,21 @@ class CountingPlace(Protocol):
     @property
     def name(self) -> str:
         """What it is called."""
+        ...
 
     @property
     def directions(self) -> tuple[str, str]:
         """Names of the two directions in which it is crossed."""
+        ...
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest x, y (px)."""
+        ...
 
     def meetings(self, ways: FloatArray) -> Meetings:
         """Find where ways (K, M, 2) cross it."""
+        ...
 
 
 def passages(

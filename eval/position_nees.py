@@ -68,16 +68,16 @@ def position_errors(
         frames = build_frames(truth, table, kind=kind)
         there, track = matched_entries(frames.iou, _MATCH_IOU)
         box = frames.truth_boxes[there]
-        width, height = (truth.boxes[:, :2] + truth.boxes[:, 2:]).max(axis=0, initial=0.0)
+        right, bottom = (truth.boxes[:, :2] + truth.boxes[:, 2:]).max(axis=0, initial=0.0)
         far = box[:, :2] + box[:, 2:]
-        inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < width - _EDGE_PX)
-        inside &= far[:, 1] < height - _EDGE_PX
+        inside = (box[:, :2] > _EDGE_PX).all(axis=1) & (far[:, 0] < right - _EDGE_PX)
+        inside &= far[:, 1] < bottom - _EDGE_PX
         error = frames.tracks.mean[track, :2] - (box[:, :2] + 0.5 * box[:, 2:])
         names = np.unique(truth.object_id)
         whose = objects + np.searchsorted(names, frames.truth_id[there])
         of = np.full(len(whose), number)
-        found = (error, frames.tracks.var[track, :2], frames.tracks.boxes[track, 3], whose, of)
-        columns.append(tuple(column[inside] for column in found))
+        var, height = frames.tracks.var[track, :2], frames.tracks.boxes[track, 3]
+        columns.append((error[inside], var[inside], height[inside], whose[inside], of[inside]))
         objects += len(names)
     return PositionErrors(*(np.concatenate(parts) for parts in zip(*columns, strict=True)))
 

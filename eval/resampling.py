@@ -96,7 +96,8 @@ def predict_to(
     known = row_t if instants is None else np.concatenate((row_t, np.asarray(instants, dtype=np.float64)))
     instant_t = np.unique(known)
     if not len(instant_t):
-        return _gather(table, *(np.zeros(0, dtype=np.int64),) * 2, np.zeros(0))
+        nothing = np.zeros(0, dtype=np.int64)
+        return _gather(table, nothing, nothing, np.zeros(0))
     latest = np.searchsorted(instant_t, times + TIME_TOLERANCE_S, side="right") - 1
     age = times - instant_t[np.maximum(latest, 0)]
     alive = (latest >= 0) & (age <= max_age_s + TIME_TOLERANCE_S)

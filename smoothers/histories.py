@@ -93,6 +93,7 @@ class Solver(Protocol):
             wanted: how many of each one's records.
             final: whether rows are given out of them; else nobody may notice that they were asked for.
         """
+        ...
 
     def leave(self, track_id: int, count: int) -> None:
         """Take note that the first records of a track's window were given out and are in it no more."""
@@ -105,6 +106,7 @@ class Solver(Protocol):
 
     def counts(self) -> dict[str, int]:
         """Return what it counts, by name."""
+        ...
 
 
 class RtsSolver:

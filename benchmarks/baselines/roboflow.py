@@ -46,19 +46,18 @@ class RoboflowTracker:
         corners = np.concatenate((frame.boxes[:, :2], frame.boxes[:, :2] + frame.boxes[:, 2:]), axis=1)
         seen = sv.Detections(xyxy=corners, confidence=frame.scores, class_id=frame.sensor)
         out = self._tracker.update(seen, timestamp=frame.t)
-        if not len(out):
-            out = sv.Detections.empty()
-            out.tracker_id = np.zeros(0, dtype=np.int64)
-            out.confidence, out.class_id = np.zeros(0), np.zeros(0, dtype=np.int64)
+        # Where it returns nothing, these are None.
+        given = (out.tracker_id, out.confidence, out.class_id)
+        ids, scores, sensors = (np.zeros(0) if column is None else column for column in given)
         # The tracker returns every detection; those that belong to no confirmed track have the identity -1.
-        good = out.tracker_id >= 0
-        ids = out.tracker_id[good].astype(np.int64)
+        good = ids >= 0
+        ids = np.asarray(ids[good], dtype=np.int64)
         box = out.xyxy[good].astype(np.float64)
         return TrackedFrame(
             track_id=ids,
             boxes=np.concatenate((box[:, :2], box[:, 2:] - box[:, :2]), axis=1),
-            scores=out.confidence[good].astype(np.float64),
-            used=np.left_shift(1, out.class_id[good].astype(np.int64)),
+            scores=scores[good].astype(np.float64),
+            used=np.left_shift(1, sensors[good].astype(np.int64)),
             velocity=_velocities(self._tracker, ids, self._rate_hz),
         )
 

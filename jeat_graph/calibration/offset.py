@@ -70,7 +70,7 @@ def lag_of(
     columns[:, 0, 1], columns[:, 1, 2] = (side / size).T
     X = columns.reshape(-1, 3)
     group = np.repeat(np.unique(key, return_inverse=True)[1], 2)
-    weight = np.ones(len(y))
+    weight, found, rest, normal = np.ones(len(y)), np.zeros(3), y, np.eye(3)
     for _ in range(_ROUNDS):
         normal = (X * weight[:, None]).T @ X + 1e-12 * np.eye(3)
         found = np.linalg.solve(normal, (X * weight[:, None]).T @ y)

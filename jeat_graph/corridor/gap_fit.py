@@ -198,7 +198,7 @@ def _clock_and_weights(
     )  # fmt: skip
     hessian = jacobian.T @ (weight[:, None] * jacobian) + np.diag(precision)
     step = -np.linalg.solve(hessian, jacobian.T @ (weight * e) + precision * off)
-    covariance = np.linalg.inv(hessian)[:2, :2]
+    covariance = np.asarray(np.linalg.inv(hessian), dtype=np.float64)[:2, :2]
     # A step of the offset is no longer than what keeps travel times positive.
     step[0] = np.clip(
         step[0], -0.5 * float(travel.min(initial=np.inf)), 0.5 * float(travel.min(initial=np.inf))
@@ -209,7 +209,7 @@ def _clock_and_weights(
         distance_m=p.distance_m + step[1],
         weights=(p.weights[0] + step[2], p.weights[1] + step[3]),
     )
-    return new, mean + step[4], covariance
+    return new, mean + float(step[4]), covariance
 
 
 def _features(

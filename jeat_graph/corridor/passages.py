@@ -109,16 +109,14 @@ def read_passages(
     sigma_t = np.where(np.isfinite(s := _optional(table, "sigma_t")[here]), s, _USUAL_SIGMA_S)
     lane = _texts(table, "lane")[here]
     order = np.lexsort((track_id, t))
-    track_id, t, kmh, low, high, sigma_t, lane = (
-        values[order] for values in (track_id, t, kmh, low, high, sigma_t, lane)
-    )
+    track_id, lane = track_id[order], lane[order]
+    t, kmh, low, high, sigma_t = (values[order] for values in (t, kmh, low, high, sigma_t))
     slow = ~(kmh / KMH > _LEAST_SPEED)
     left_out = [
         (int(k), f"its speed at the line {line!r} is not known, or it stands") for k in track_id[slow]
     ]
-    track_id, t, kmh, low, high, sigma_t, lane = (
-        values[~slow] for values in (track_id, t, kmh, low, high, sigma_t, lane)
-    )
+    track_id, lane = track_id[~slow], lane[~slow]
+    t, kmh, low, high, sigma_t = (values[~slow] for values in (t, kmh, low, high, sigma_t))
     sigma_speed = np.where(np.isfinite(high - low), (high - low) / (2.0 * Z95 * kmh), np.nan)
     sigma_speed = np.where(np.isfinite(sigma_speed), sigma_speed, _USUAL_SIGMA_SPEED)
     keep, doubled = _without_fragments(track_id, t, kmh, lane, sigma_speed)

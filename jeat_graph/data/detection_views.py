@@ -43,11 +43,6 @@ class DetectionViews:
             ...
 
         @staticmethod
-        def from_rows(*columns: Any) -> Detections:
-            """Group rows into scans."""
-            ...
-
-        @staticmethod
         def from_table(rows: DetectionRows) -> Detections:
             """Group the rows of a table into scans."""
             ...
@@ -103,8 +98,8 @@ class DetectionViews:
         """
         return cls.from_table(rows_of_frame(frame, Reading(**options), sensor))
 
-    @classmethod
-    def from_supervision(cls, source: Any, *, t: float, sensor: str = "rgb") -> Detections:
+    @staticmethod
+    def from_supervision(source: Any, *, t: float, sensor: str = "rgb") -> Detections:
         """Take `supervision.Detections` of one picture as a scan; `concatenate` joins those of a video.
 
         Args:
@@ -112,11 +107,15 @@ class DetectionViews:
             t: time of the picture (s).
             sensor: name of the sensor.
         """
+        from jeat_graph.data.detections import Detections
+
         boxes, scores, classes, kept, _ = boxes_of(source)
         if len(boxes):
-            out = cls.from_rows(np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes)
+            out = Detections.from_rows(
+                np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes
+            )
         else:
-            out = cls.from_rows([t], [sensor], np.full((1, 4), np.nan), [np.nan], [True])
+            out = Detections.from_rows([t], [sensor], np.full((1, 4), np.nan), [np.nan], [True])
         return replace(out, dropped=int(np.sum(~kept)))
 
     def to_supervision(self) -> Any:

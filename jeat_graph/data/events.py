@@ -51,6 +51,17 @@ class EventArray:
         first, last = np.searchsorted(self.t_us, [start_us, end_us])
         return self.take(slice(int(first), int(last)))
 
+    def contiguous(
+        self,
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.uint16], npt.NDArray[np.uint16], npt.NDArray[np.uint8]]:
+        """Return times (µs), x, y and polarities, each (N,), as the core takes them."""
+        return (
+            np.ascontiguousarray(self.t_us, np.int64),
+            np.ascontiguousarray(self.x, np.uint16),
+            np.ascontiguousarray(self.y, np.uint16),
+            np.ascontiguousarray(self.polarity, np.uint8),
+        )
+
     @staticmethod
     def trusted(
         t_us: IntArray,

@@ -116,7 +116,7 @@ class PictureMap:
         lower = self.points(np.stack([x, top + height], axis=1), 0.0)
         size = np.stack([last[:, 0] - first[:, 0], lower[:, 1] - upper[:, 1]], axis=1)
         out = np.concatenate([centre - 0.5 * size, size], axis=1)
-        good = np.isfinite(out).all(axis=1) & (size > 0.0).all(axis=1)
+        good = np.all(np.isfinite(out), axis=1) & np.all(size > 0.0, axis=1)
         return out, good
 
     def back(self, boxes: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -130,7 +130,7 @@ class PictureMap:
             with np.errstate(divide="ignore", invalid="ignore"):
                 own_size = own_size * np.where(there[:, 2:] > 0.0, size / there[:, 2:], np.nan)
         out = np.concatenate([xy - 0.5 * own_size, own_size], axis=1)
-        return out, np.isfinite(out).all(axis=1)
+        return out, np.all(np.isfinite(out), axis=1)
 
     def _point_back(self, xy: FloatArray, height: FloatArray) -> FloatArray:
         """Own points (N, 2) of common ones (N, 2) in boxes of own heights (N,)."""

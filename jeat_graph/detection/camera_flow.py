@@ -165,11 +165,12 @@ class CameraFlow:
         back, again, _ = cv2.calcOpticalFlowPyrLK(grey, key.grey, there, start, **options)
         good = (ok.ravel() == 1) & (again.ravel() == 1)
         good &= np.linalg.norm((back - key.corners).reshape(-1, 2), axis=1) < _RETURN_PX
-        good &= _is_seen(np.asarray(there, dtype=np.float32).reshape(-1, 2), seen)
+        after = np.asarray(there, dtype=np.float32).reshape(-1, 2)
+        good &= _is_seen(after, seen)
         count = int(good.sum())
         if count < _LEAST:
             return None, count
-        return _fit(key.corners[good].reshape(-1, 2), there[good].reshape(-1, 2), grey.shape[1]), count
+        return _fit(key.corners[good].reshape(-1, 2), after[good], grey.shape[1]), count
 
     def _motion(self, pose: Pose, shape: tuple[int, ...], t: float, span_s: float) -> FloatArray | None:
         """Return the motion (11,) from the picture before to one of this pose (working px)."""
@@ -226,18 +227,26 @@ def similarity(before: npt.NDArray[np.complex128], after: npt.NDArray[np.complex
         before: (N,) points x + i y (px).
         after: (N,) where they went.
     """
-    weight = np.ones(len(before))
-    for _ in range(_PASSES):
-        total = weight.sum()
-        centre, to = (weight @ before) / total, (weight @ after) / total
-        spread = float(weight @ np.abs(before - centre) ** 2)
-        turn = complex((weight @ ((after - to) * np.conj(before - centre))) / spread)
-        error2 = np.abs(after - to - turn * (before - centre)) ** 2
-        # Of one axis; two axes of N points less four unknowns.
-        var = float(max((weight @ error2) / max(2.0 * len(before) - 4.0, 1.0), _LEAST_ERROR_PX**2))
-        weight = (_DEGREES + 2.0) / (_DEGREES + error2 / var)
+    pose, weight = _weighted_similarity(before, after, np.ones(len(before)))
+    for _ in range(_PASSES - 1):
+        pose, weight = _weighted_similarity(before, after, weight)
+    return pose
+
+
+def _weighted_similarity(
+    before: npt.NDArray[np.complex128], after: npt.NDArray[np.complex128], weight: FloatArray
+) -> tuple[Pose, FloatArray]:
+    """Fit with weights (N,); returns the weights too that the errors give the points."""
+    total = weight.sum()
+    centre, to = (weight @ before) / total, (weight @ after) / total
+    spread = float(weight @ np.abs(before - centre) ** 2)
+    turn = complex((weight @ ((after - to) * np.conj(before - centre))) / spread)
+    error2 = np.abs(after - to - turn * (before - centre)) ** 2
+    # Of one axis; two axes of N points less four unknowns.
+    var = float(max((weight @ error2) / max(2.0 * len(before) - 4.0, 1.0), _LEAST_ERROR_PX**2))
     by_shift = _CORRELATED * var / float(total) + _COMMON_PX**2
-    return Pose(turn, complex(to - turn * centre), complex(centre), (by_shift, _CORRELATED * var / spread))
+    pose = Pose(turn, complex(to - turn * centre), complex(centre), (by_shift, _CORRELATED * var / spread))
+    return pose, np.asarray((_DEGREES + 2.0) / (_DEGREES + error2 / var), dtype=np.float64)
 
 
 def _going(pose: Pose, shape: tuple[int, ...]) -> npt.NDArray[np.complex128]:

@@ -88,7 +88,8 @@ def _circular(place: FloatArray, weight: FloatArray, bins: int) -> FloatArray:
     first, weight = first.ravel(), weight.ravel()
     return np.asarray(
         np.bincount(first % bins, weight * (1.0 - share), bins)
-        + np.bincount((first + 1) % bins, weight * share, bins)
+        + np.bincount((first + 1) % bins, weight * share, bins),
+        dtype=np.float64,
     )
 
 

@@ -37,11 +37,8 @@ class Lamps:
 
     def watch(self, events: EventArray) -> None:
         """Take the next events."""
-        columns = (events.t_us, events.x, events.y, events.polarity)
-        kinds = (np.int64, np.uint16, np.uint16, np.uint8)
-        t, x, y, polarity = (np.ascontiguousarray(a, kind) for a, kind in zip(columns, kinds, strict=True))
-        good = np.ones(len(t), dtype=bool)
-        core.leave_flicker(t, x, y, polarity, self._rise, self._state, RULE, good)
+        good = np.ones(len(events), dtype=bool)
+        core.leave_flicker(*events.contiguous(), self._rise, self._state, RULE, good)
 
     def without(self, marks: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return events a pixel (H, W) without those of lamps, also such from before they were known."""

@@ -85,10 +85,7 @@ class NoiseFilter:
             return events
         if events.by_motion is not None:
             return events.take(np.flatnonzero(good))
-        columns = (events.t_us, events.x, events.y, events.polarity)
-        kinds = (np.int64, np.uint16, np.uint16, np.uint8)
-        t, x, y, polarity = (np.ascontiguousarray(a, kind) for a, kind in zip(columns, kinds, strict=True))
-        return EventArray.trusted(*core.take_events(t, x, y, polarity, good))
+        return EventArray.trusted(*core.take_events(*events.contiguous(), good))
 
     def signal(self, events: EventArray) -> BoolArray:
         """Return which events (N,) are not noise."""

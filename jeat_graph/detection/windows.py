@@ -23,7 +23,8 @@ _SPARSE_SHARE = 0.01
 #: Where more than this share of the pixels is asked for, all are summed: neighbours in memory at once.
 _DENSE_SHARE = 0.02
 # Of a bin: how many events, and where.
-_NOTHING = (0, EventArray.empty().x, EventArray.empty().y)
+_Filled = tuple[int, npt.NDArray[np.uint16], npt.NDArray[np.uint16]]
+_NOTHING: _Filled = (0, EventArray.empty().x, EventArray.empty().y)
 
 
 class EventBins:

@@ -128,6 +128,7 @@ def run_on_ray(
     """
     try:
         import ray
+        from ray.exceptions import RayError
     except ImportError:
         raise JeatGraphError(f"--engine ray needs Ray: {install('ray')}") from None
     options: dict[str, Any] = {"log_to_driver": False, "logging_level": "error"}
@@ -151,7 +152,7 @@ def run_on_ray(
                 job = at_work.pop(reference)
                 try:
                     yield ray.get(reference)
-                except ray.exceptions.RayError:
+                except RayError:
                     yield lost(job)
     finally:
         if began:

@@ -116,6 +116,8 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
         hz = None if rate is None or rate[row] != rate[row] else float(rate[row])
         if hz is not None and hz <= 0.0:
             raise table.error(row, f"rate must be positive, got {hz:g}")
+        data: dict[str, Any]
+        data = {"reading": _reading(cells, folder, error)} if files else _raw(cells, folder, error)
         recordings.append(
             ManifestRow(
                 name=name,
@@ -125,7 +127,7 @@ def read_manifest(path: str | Path) -> list[ManifestRow]:
                 truth=_located(cells["gt"], folder) if cells.get("gt") else None,
                 rate_hz=hz,
                 camera=_located(cells["camera"], folder) if cells.get("camera") else None,
-                **({"reading": _reading(cells, folder, error)} if files else _raw(cells, folder, error)),
+                **data,
             )
         )
     if not recordings:

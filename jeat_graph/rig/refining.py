@@ -130,7 +130,9 @@ def refine(
     paths = [_path(ours, other, unknowns.clock) for ours, other in pairs]
     sigma = (_SIGMA, _SIGMA)
     centre, scale = _prior(unknowns, *sizes)
-    for _ in range(_ROUNDS):
+    round_number = 0
+    while True:
+        round_number += 1
         rows, residuals = zip(*(_rows(path, unknowns, sigma, scale) for path in paths), strict=True)
         shift = (_numbers(unknowns) - centre) / scale
         solved = solve_paths(rows, np.eye(len(scale)), -shift)
@@ -139,9 +141,8 @@ def refine(
             path._replace(states=_unscaled(states)) for path, states in zip(paths, solved.states, strict=True)
         ]
         sigma = (_robust([part for one in residuals for part in one]),) * 2
-        if _largest_move(unknowns.way, scale * solved.shared, paths) < _ENOUGH_PX:
-            break
-    return _result(unknowns, solved, scale, paths, sigma)
+        if round_number == _ROUNDS or _largest_move(unknowns.way, scale * solved.shared, paths) < _ENOUGH_PX:
+            return _result(unknowns, solved, scale, paths, sigma)
 
 
 def no_smaller(value: float) -> float:

@@ -81,13 +81,17 @@ def register_by_traffic(
             )
     matched = _best(first, second, names) if start is None else match_again(first, second, start)
     _check_matches(matched, names)
+
+    def refine_and_match() -> tuple[Refined, MatchedTracks]:
+        refined = refine(first, second, matched, sizes)
+        again = match_again(first, second, matched._replace(way=refined.way, offset_s=refined.clock.offset_s))
+        _check_matches(again, names)
+        return refined, again
+
     try:
-        for _ in range(_ROUNDS):
-            refined = refine(first, second, matched, sizes)
-            matched = match_again(
-                first, second, matched._replace(way=refined.way, offset_s=refined.clock.offset_s)
-            )
-            _check_matches(matched, names)
+        refined, matched = refine_and_match()
+        for _ in range(_ROUNDS - 1):
+            refined, matched = refine_and_match()
     except RuntimeError:
         raise _undetermined(names, "it leaves the map between the pictures open") from None
     _check_certainty(refined, second, matched, names, sizes[1])

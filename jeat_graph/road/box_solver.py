@@ -103,6 +103,7 @@ def solve_boxes(
     """
     P, theta, weight = len(start), start, np.ones(len(rows.t))
     mean, precision = prior
+    found: Solution | None = None
     for k in range(_STEPS):
         columns = columns_of(camera, rows, motion, theta)
         if columns is None:
@@ -120,9 +121,10 @@ def solve_boxes(
         factor = size_step(theta[-3:], theta[-3:] + step[-3:])
         theta = theta + factor * step
         settled = step @ normal @ step < _SETTLED * _SETTLED * P and factor == 1.0
+        found = Solution(theta, normal, cost, chi2, weight)
         if k > _PLAIN_STEPS and settled:
             break
-    return Solution(theta, normal, cost, chi2, weight) if np.isfinite(theta).all() else None
+    return found if np.isfinite(theta).all() else None
 
 
 def size_step(size: FloatArray, target: FloatArray) -> float:

@@ -68,7 +68,7 @@ class Lengths:
     def __len__(self) -> int:
         return len(self.metres)
 
-    def take(self, rows: FloatArray | BoolArray | IntArray) -> Lengths:
+    def take(self, rows: BoolArray | IntArray) -> Lengths:
         """Return the lengths chosen by an index or mask array."""
         return Lengths(self.start[rows], self.end[rows], self.metres[rows], self.along[rows])
 

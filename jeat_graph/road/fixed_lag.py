@@ -221,7 +221,7 @@ class RoadFixedLag:
             if system is None:
                 return False
             mean, cov = window.belief
-            W = np.linalg.inv(np.linalg.cholesky(cov))
+            W = np.asarray(np.linalg.inv(np.linalg.cholesky(cov)), dtype=np.float64)
             solved = solve_shared_chain(system[0], [*window.priors, PriorRows(None, W, W @ mean)])
             window.coefficients = coefficients_of(solved)
             window.size = window.size + size_step(window.size, solved.shared) * (solved.shared - window.size)

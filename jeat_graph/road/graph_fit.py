@@ -124,24 +124,25 @@ def _fit_kind(
         PriorRows(None, np.diag(1.0 / spread), np.array(one.mean) / spread),
     ]
     weight = np.ones(len(rows.t))
+    step = None
     for k in range(_STEPS):
         linear = factors(drive, trial, weight, soft if k >= _PLAIN_STEPS else None)
         if linear is None:
             return None
-        system, log_errors = linear
-        solved = solve_shared_chain(system, priors)
+        solved = solve_shared_chain(linear[0], priors)
         factor = size_step(trial.size, solved.shared)
         coefficients = coefficients_of(solved)
         target = trial_at(drive, coefficients, solved.shared)
         off, more = target.place - trial.place, target.size - trial.size
         if factor < 1.0:
             target = target._replace(place=trial.place + factor * off, size=trial.size + factor * more)
-        trial = target
+        trial, step = target, (*linear, solved, coefficients)
         if k > _PLAIN_STEPS and max(np.abs(off).max(), np.abs(more).max()) < _SETTLED_M:
             break
     found = residuals(drive.camera, rows, trial) if np.isfinite(trial.place).all() else None
-    if found is None:
+    if step is None or found is None:
         return None
+    system, log_errors, solved, coefficients = step
     cost = _cost(system, priors, solved) + log_errors + solved.log_determinant
     cost += 2.0 * float(np.log(one.spread).sum()) - 2.0 * math.log(one.share)
     white = found[1][..., None].copy()

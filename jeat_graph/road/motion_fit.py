@@ -156,17 +156,24 @@ def fit_motion(
         # First without the jerks: a motion that can bend would follow a point that leaves the vehicle.
         bends = np.r_[3:C, C + 3 : 2 * C]
         stiff[bends, bends] *= 1e6
-    for k in range(_ROBUST_PASSES):
+
+    def solve(weight: FloatArray, belief: FloatArray) -> tuple[FloatArray, ...]:
+        """Coefficients, covariance, derivatives by the places, residuals, and weights by these residuals."""
         root = 1.0 / np.sqrt(np.maximum(weight, 1e-8))
         # A doubtful point is given more white noise of its own; what it shares with its neighbours stays.
         factor = cho_factor(errors + np.diag(size**2 * (root**2 - 1.0)))
         solved = cho_solve(factor, A.reshape(n, -1)).reshape(n, 2, 2 * C)
-        normal = np.einsum("nia,nib->ab", A, solved) + (stiff if k < _STIFF_PASSES else prior)
-        inverse = np.linalg.inv(normal)
+        inverse = np.linalg.inv(np.einsum("nia,nib->ab", A, solved) + belief)
         gain_px = np.einsum("ab,nib->ani", inverse, solved)
         c = np.einsum("ani,ni->a", gain_px, b)
         residual = (b - A @ c) / size[:, None]
-        weight = kernel(np.linalg.norm(residual, axis=1), config.soft)
+        return c, inverse, gain_px, residual, kernel(np.linalg.norm(residual, axis=1), config.soft)
+
+    for _ in range(_STIFF_PASSES):
+        *_, weight = solve(weight, stiff)
+    for _ in range(_STIFF_PASSES, _ROBUST_PASSES - 1):
+        *_, weight = solve(weight, prior)
+    c, inverse, gain_px, residual, weight = solve(weight, prior)
     gain = np.einsum("ani,nij->anj", gain_px, inverse_px)
     return MotionFit(
         t0, knots, (c + centre).reshape(2, C), (inverse + inverse.T) / 2.0, gain, t, residual, weight

@@ -91,7 +91,7 @@ def summarise(
     the recording began and ended (s), for the intervals in which nobody came by. Parked vehicles show no
     lanes, and are in none.
     """
-    when = [np.array(np.mean(v.fit.window())) for v in vehicles]
+    when = [np.array(np.mean(v.fit.window()), dtype=np.float64) for v in vehicles]
     middle = np.array([v.fit.at(t)[0] for v, t in zip(vehicles, when, strict=True)], dtype=np.float64)
     velocity = np.array([v.fit.at(t, 1) for v, t in zip(vehicles, when, strict=True)]).reshape(-1, 2)
     parked = np.array([is_parked(vehicle) for vehicle in vehicles], dtype=np.bool_)

@@ -54,7 +54,7 @@ class LeftOut(NamedTuple):
 
 #: Reason of a track of which too little can be placed.
 TOO_LITTLE = "too little of it is on the road"
-NO_SIZE = Size((np.nan,) * 3, (np.nan,) * 3)
+NO_SIZE = Size((np.nan, np.nan, np.nan), (np.nan, np.nan, np.nan))
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,6 +76,7 @@ def fit_tracks(
     A, b = whiten @ design, (whiten @ xy[..., None])[..., 0]
     fixed = weight is not None
     w = agreed_weights(s, xy, whiten, _SOFT) if weight is None else weight
+    residual, motion = b, np.zeros((len(tracks), 5))
     for _ in range(1 if fixed else _ROBUST_PASSES):
         wA = A * w[..., None, None]
         normal = np.einsum("kmij,kmil->kjl", wA, A) + prior[:, :, None] * np.eye(5)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.errors import TimeOrderError
 from jeat_graph.data.scan import time_of
 from jeat_graph.data.trajectories import Trajectories
@@ -80,7 +80,7 @@ def predicted(
     return (np.full(len(mean), t), ids, flat, variance, real, 0 * used, label, share), motion
 
 
-def still_there(rows: ModelRows, picture: tuple[float, float]) -> FloatArray:
+def still_there(rows: ModelRows, picture: tuple[float, float]) -> BoolArray:
     """Return which rows (N,) have a box that some part of the picture (px) shows."""
     boxes = box_sides.corners(rows[2].reshape(-1, 2, singer.MOTION))
     return np.asarray(((boxes[:, 2:] > 0.0) & (boxes[:, :2] < picture)).all(axis=1))

@@ -15,6 +15,13 @@ from jeat_graph.data.arrays import BoolArray
 from jeat_graph.data.errors import DataError
 
 
+def arrow_compute() -> Any:
+    """Return `pyarrow.compute`, which makes its functions when it is imported: no type checker knows them."""
+    from pyarrow import compute
+
+    return compute
+
+
 def to_numpy(column: Any, missing: float | None = None) -> npt.NDArray[Any]:
     """Return an Arrow column of numbers or truth values as an array (R,).
 

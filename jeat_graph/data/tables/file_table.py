@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.tables.arrow_arrays import first_refused, from_numpy, to_numpy
+from jeat_graph.data.tables.arrow_arrays import arrow_compute, first_refused, from_numpy, to_numpy
 from jeat_graph.data.tables.spreadsheets import is_number, unguarded
 from jeat_graph.data.tables.vector_columns import read_vectors
 from jeat_graph.data.time_text import all_seconds, looks_like_time
@@ -227,7 +227,8 @@ class FileTable:
             DataError: names the first line or row that is blank, unless that is allowed.
         """
         import pyarrow as pa
-        from pyarrow import compute
+
+        compute = arrow_compute()
 
         column = self._columns[name]
         try:
@@ -296,7 +297,8 @@ def advice_on(text: str) -> str:
 def _cast(column: Any, decimal_comma: bool = False) -> Any:
     """Convert Arrow text or numbers to float64, passing over white space around a number."""
     import pyarrow as pa
-    from pyarrow import compute
+
+    compute = arrow_compute()
 
     if decimal_comma:
         column = compute.replace_substring(column, ",", ".")

@@ -9,6 +9,7 @@ import numpy as np
 
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import collected, named_columns
+from jeat_graph.data.tables.arrow_arrays import arrow_compute
 from jeat_graph.data.tables.file_table import FileTable
 
 
@@ -35,7 +36,8 @@ def table_of_frame(frame: Any, required: Sequence[str], optional: Sequence[str],
 def _arrow(column: Any) -> Any:
     """Return a column as Arrow's, null where it has no value; what is of several kinds as text."""
     import pyarrow as pa
-    from pyarrow import compute
+
+    compute = arrow_compute()
 
     if not isinstance(column, pa.Array | pa.ChunkedArray):
         column = column.to_arrow() if hasattr(column, "to_arrow") else _from_objects(column)

@@ -11,6 +11,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from jeat_graph.data.tables.arrow_arrays import arrow_compute
+
 # The usual signs, their full-width forms, and white space that is passed over before them. A text that begins
 # with apostrophes before these gets one more, so that reading is the inverse of writing.
 _FORMULA = r"^'*[=+\-@\t\r\n＝＋－＠]"
@@ -31,7 +33,8 @@ def unguarded(text: str) -> str:
 def guarded_column(column: Any) -> Any:
     """Return an Arrow column of text as it stands in a CSV file; one without such texts as it is."""
     import pyarrow as pa
-    from pyarrow import compute
+
+    compute = arrow_compute()
 
     if not compute.any(compute.match_substring_regex(column, _FORMULA)).as_py():
         return column

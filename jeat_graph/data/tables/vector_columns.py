@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.errors import DataError
-from jeat_graph.data.tables.arrow_arrays import first_refused, to_numpy
+from jeat_graph.data.tables.arrow_arrays import arrow_compute, first_refused, to_numpy
 
 
 def read_vectors(column: Any, fault: Callable[[int, str], DataError]) -> FloatArray:
@@ -26,7 +26,8 @@ def read_vectors(column: Any, fault: Callable[[int, str], DataError]) -> FloatAr
         DataError: a row that is no vector, or has more or fewer numbers than the first.
     """
     import pyarrow as pa
-    from pyarrow import compute
+
+    compute = arrow_compute()
 
     try:
         if pa.types.is_fixed_size_list(column.type):
@@ -59,6 +60,7 @@ def read_vectors(column: Any, fault: Callable[[int, str], DataError]) -> FloatAr
 def lists_as_text(column: Any) -> Any:
     """Return an Arrow column of lists as text: numbers with blanks between them, null where there is none."""
     import pyarrow as pa
-    from pyarrow import compute
+
+    compute = arrow_compute()
 
     return compute.binary_join(column.cast(pa.list_(pa.string())), " ")

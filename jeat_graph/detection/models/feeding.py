@@ -96,7 +96,7 @@ def picture_input(
 
     width, height = shown_px
     if frame.shape[:2] != (height, width):
-        frame = np.asarray(cv2.resize(frame, shown_px))
+        frame = np.asarray(cv2.resize(frame, shown_px), dtype=np.uint8)
     values = np.full((1, 3, side[1], side[0]), _FILL / _WHITE, dtype=np.float32)
     values[0, :, :height, :width] = frame.transpose(2, 0, 1)
     values[0, :, :height, :width] /= _WHITE

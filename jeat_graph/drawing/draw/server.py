@@ -111,17 +111,21 @@ class DrawServer(WebServer):
 
 
 class _Handler(WebHandler):
-    server: DrawServer
     timeout = 10.0
+
+    @property
+    def _draw(self) -> DrawServer:
+        assert isinstance(self.server, DrawServer)
+        return self.server
 
     def get(self) -> None:
         """Give the page, its picture, or what is drawn already."""
         if not self._from_here():
             return
-        if self.path == f"{self.server.prefix}marks.json":
-            self._answer(_JSON, json.dumps(self.server.page).encode())
+        if self.path == f"{self._draw.prefix}marks.json":
+            self._answer(_JSON, json.dumps(self._draw.page).encode())
             return
-        found = self.server.answers.get(self.path)
+        found = self._draw.answers.get(self.path)
         if found is None:
             self._answer(_TEXT, b"not here", HTTPStatus.NOT_FOUND)
         else:
@@ -129,7 +133,7 @@ class _Handler(WebHandler):
 
     def post(self) -> None:
         """Save what was drawn; `done` ends the server too."""
-        ends = {f"{self.server.prefix}{name}": name == "done" for name in ("save", "done")}
+        ends = {f"{self._draw.prefix}{name}": name == "done" for name in ("save", "done")}
         if not self._from_here():
             return
         if self.path not in ends or self.headers.get("Content-Type") != _JSON:
@@ -137,15 +141,15 @@ class _Handler(WebHandler):
             return
         try:
             page: Any = json.loads(self.rfile.read(self._length()))
-            reply = save_page(page, *self.server.files)
+            reply = save_page(page, *self._draw.files)
         except (JeatGraphError, ValueError, RecursionError, OSError) as error:
             self._answer(_TEXT, " ".join(str(error).split()).encode(), HTTPStatus.BAD_REQUEST)
             return
-        self.server.page = page
+        self._draw.page = page
         try:
             self._answer(_TEXT, reply.encode())
         finally:  # it is saved, whether or not the browser waited for the answer
-            self.server.done = ends[self.path]
+            self._draw.done = ends[self.path]
 
     def _length(self) -> int:
         length = int(self.headers.get("Content-Length", "0"))
@@ -154,7 +158,7 @@ class _Handler(WebHandler):
         return length
 
     def _from_here(self) -> bool:
-        if self.headers.get("Host") in self.server.hosts:
+        if self.headers.get("Host") in self._draw.hosts:
             return True
         self._answer(_TEXT, b"not here", HTTPStatus.FORBIDDEN)
         return False

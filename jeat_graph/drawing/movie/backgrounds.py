@@ -96,6 +96,10 @@ class EventBackground:
         end = round(t * _US_PER_S) - self._offset_us + 1
         return accumulate(self._source.between(end - self._window_us, end), self.size_px)
 
+    def notes(self) -> list[str]:
+        """Say what of the file was left out."""
+        return self._source.notes()
+
 
 def accumulate(events: EventArray, size_px: tuple[int, int]) -> RgbImage:
     """Draw events: the more of one kind a pixel has, the more of that kind's colour.

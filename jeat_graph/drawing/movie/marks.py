@@ -97,7 +97,7 @@ class Canvas:
             thin: leave out those that would lie on one that stands already.
         """
         taken: list[Place] = []
-        for k in np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable").tolist():
+        for k in map(int, np.argsort(-boxes[:, 2] * boxes[:, 3], kind="stable")):
             left, top = boxes[k, :2] * self._scale
             painted = self._letters(texts[k], NAME_SIZE)
             place = room_for(painted, (float(left), float(top) - 4.0 * self.unit), self._size_px)

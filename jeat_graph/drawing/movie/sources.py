@@ -173,7 +173,7 @@ def open_movie(request: Request, stack: ExitStack) -> tuple[Movie, float, list[s
         joins=_joins(request.run, tables.get("smoothed")),
     )
     warnings += _absent(frames, tables, truth, times)
-    warnings += [f"{request.events}: {note}" for note in ([] if events is None else stretches.notes())]
+    warnings += [f"{request.events}: {note}" for note in ([] if events is None else events.notes())]
     return movie, rate_hz, warnings
 
 

@@ -39,7 +39,9 @@ def find_item(file: Any, name: str, path: Path) -> Any:
         if not part:
             continue
         try:
-            link = item.get(part, getlink=True) if isinstance(item, h5py.Group) else None
+            if not isinstance(item, h5py.Group):
+                return None
+            link = item.get(part, getlink=True)
             if isinstance(link, h5py.SoftLink):
                 links += 1
                 if links > _MOST_LINKS:
@@ -49,7 +51,7 @@ def find_item(file: Any, name: str, path: Path) -> Any:
                 continue
             if link is not None and not isinstance(link, h5py.HardLink):
                 raise DataError(f"{name} stands in another file; links to other files are not followed", path)
-            item = None if link is None else item.get(part)
+            item = item.get(part)
         except (OSError, KeyError, RuntimeError, ValueError, UnicodeError) as error:
             reason = " ".join(str(error).split())[:120]
             raise DataError(f"{name} cannot be read: {reason}", path) from None

@@ -20,11 +20,11 @@ from pathlib import Path
 
 from jeat_graph.data.errors import DataError, InputWarning
 
-try:
-    import fcntl
-except ImportError:  # Windows
+if sys.platform == "win32":
     _HAS_LOCKS = False
 else:
+    import fcntl
+
     _HAS_LOCKS = True
 
 #: Neither follows a link that somebody has put there, nor waits for the other end of a pipe, nor is handed on

@@ -54,7 +54,7 @@ def read_array(path: str | Path) -> FileTable:
             wide = field.dtype.kind == "f" and field.dtype.itemsize > np.dtype(np.float64).itemsize
             with np.errstate(over="ignore"):  # what does not fit becomes infinite, which is refused
                 native = field.astype(np.float64 if wide else field.dtype.newbyteorder("="))
-            columns.setdefault(_ALIASES.get(name, name), pa.chunked_array([pa.array(native)]))
+            columns.setdefault(_ALIASES.get(name, str(name)), pa.chunked_array([pa.array(native)]))
     for name in ("t", "x", "y", "w", "h"):
         if name not in columns:
             raise DataError(f"field {name!r} is missing or no number; there are {', '.join(names)}", path)

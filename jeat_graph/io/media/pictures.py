@@ -27,7 +27,7 @@ def as_png(picture: npt.NDArray[np.uint8 | np.uint16]) -> bytes:
     try:
         done, data = cv2.imencode(".png", np.ascontiguousarray(picture))
     except cv2.error:
-        done = False
+        done, data = False, np.zeros(0, dtype=np.uint8)
     if not done:
         raise DataError(f"a picture of shape {picture.shape} cannot be written as PNG")
     return bytes(data.tobytes())

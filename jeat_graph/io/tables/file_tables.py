@@ -10,7 +10,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import IntArray
 from jeat_graph.data.column_names import standing_in, usual_names
-from jeat_graph.data.tables.arrow_arrays import from_numpy, to_numpy
+from jeat_graph.data.tables.arrow_arrays import arrow_compute, from_numpy, to_numpy
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.io.tables.csv_text import TEXT, CsvBody, read_text
 from jeat_graph.io.tables.headers import check_names, split_header
@@ -100,7 +100,7 @@ def _table(
     """A table of Arrow columns without the rows in which every one is null; `line_of` counts these rows."""
     from functools import reduce
 
-    from pyarrow import compute
+    compute = arrow_compute()
 
     rows: IntArray | None = None
     columns = list(named.values())

@@ -8,6 +8,7 @@ from typing import Any
 
 from jeat_graph.data.column_names import standing_in, usual_names
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.arrow_arrays import arrow_compute
 from jeat_graph.io.files.limits import check_room
 from jeat_graph.io.files.unpacking import check_unpacked
 from jeat_graph.io.tables.csv_text import read_bytes
@@ -34,7 +35,9 @@ def read_columns(
         DataError: no Parquet file, a column is missing or misspelt, or it claims more rows than memory holds.
     """
     import pyarrow as pa
-    from pyarrow import compute, parquet
+    from pyarrow import parquet
+
+    compute = arrow_compute()
 
     data = read_bytes(path)
     if not data:
@@ -74,7 +77,9 @@ def _read(data: bytes, chosen: list[str], path: Path) -> Any:
         DataError: a text is too long for a name.
     """
     import pyarrow as pa
-    from pyarrow import compute, parquet
+    from pyarrow import parquet
+
+    compute = arrow_compute()
 
     kinds = {name: parquet.read_schema(pa.BufferReader(data)).field(name).type for name in chosen}
     plain = [

@@ -73,28 +73,27 @@ class TableWriter(PiecewiseWriter):
             return
         table = pa.concat_tables(self._pending)
         end = len(table) if everything else len(table) - len(table) % _CHUNK_ROWS
-        if self._sink is None:
-            self._open(table.schema)
+        sink = self._sink = self._opened(table.schema) if self._sink is None else self._sink
         for start in range(0, end, _CHUNK_ROWS):
             # In one chunk: Arrow 20 to 22 writes the rows before an empty chunk twice to CSV.
             part = table.slice(start, min(_CHUNK_ROWS, end - start)).combine_chunks()
             if self._parquet:
-                self._sink.write_table(part)
+                sink.write_table(part)
             else:
-                self._sink.write(_csv_bytes(part, self._delimiter))
+                sink.write(_csv_bytes(part, self._delimiter))
         self._pending = [table.slice(end)]
         self._rows = len(table) - end
 
-    def _open(self, schema: Any) -> None:
+    def _opened(self, schema: Any) -> Any:
         assert self._target is not None
         if self._parquet:
             from pyarrow import parquet
 
-            self._sink = self._stack.enter_context(parquet.ParquetWriter(self._target, schema))
-        else:
-            self._sink = self._stack.enter_context(self._target.open("wb"))
-            if self._header:
-                self._sink.write((self._delimiter.join(schema.names) + "\n").encode())
+            return self._stack.enter_context(parquet.ParquetWriter(self._target, schema))
+        sink = self._stack.enter_context(self._target.open("wb"))
+        if self._header:
+            sink.write((self._delimiter.join(schema.names) + "\n").encode())
+        return sink
 
 
 def write_columns(

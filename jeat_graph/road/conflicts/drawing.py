@@ -86,7 +86,8 @@ def ground(camera: RoadCamera, picture: str | Path | None) -> npt.NDArray[np.uin
 def _in_picture(camera: RoadCamera, vehicles: Sequence[Poses], picture: str | Path | None) -> Canvas:
     canvas = ground(camera, picture)
     x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
-    places = camera.to_road(np.stack([x, y], axis=-1).reshape(-1, 2)).reshape(camera.height, camera.width, 2)
+    pixels = np.stack([x, y], axis=-1, dtype=np.float64).reshape(-1, 2)
+    places = camera.to_road(pixels).reshape(camera.height, camera.width, 2)
     ways = []
     for one in vehicles:
         pixels, depth = camera.project(np.c_[one.mean[:, :2], np.zeros(len(one.t))])

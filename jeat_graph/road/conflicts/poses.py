@@ -76,7 +76,7 @@ def read_poses(source: str | Path) -> tuple[list[Poses], int]:
         return np.stack(columns, axis=1) if len(t) else np.zeros((0, len(_STATES)))
 
     mean, sigma = read("") * _UNITS, np.sqrt(np.maximum(read("var_"), 0.0)) * _UNITS
-    known = np.isfinite(mean).all(axis=1) & np.isfinite(sigma).all(axis=1)
+    known = np.all(np.isfinite(mean) & np.isfinite(sigma), axis=1)
     kinds = _kinds(path.with_name("speeds.csv"))
     vehicles, unknown = [], 0
     order = np.lexsort((t, ids))

@@ -82,7 +82,7 @@ def read_road_frames(source: str | Path, rate_hz: float) -> RoadFrames:
     for rows in np.split(order, cuts) if len(order) else []:
         check_steps(float(t[rows[0]]), float(t[rows[-1]]), rate_hz, "frames")
         first, last = np.ceil(t[rows[0]] * rate_hz - 1e-6), np.floor(t[rows[-1]] * rate_hz + 1e-6)
-        frame = np.arange(first, last + 1)
+        frame = np.arange(float(first), float(last) + 1.0)
         at = frame / rate_hz
         motion = [np.interp(at, t[rows], values[rows]) for values in columns]
         turned = np.unwrap(np.radians(columns[3][rows]))

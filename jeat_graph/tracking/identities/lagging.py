@@ -292,7 +292,7 @@ class LagSmoother:
         taken = self._follower.take_in(step.batch, given)
         assert taken is not None, "it has a smoother"
         assigned = self._follower.assigned(len(step.owner))
-        label = {one: self._label.get(one, _NOBODY + one) for one in taken.ids.tolist()}
+        label = {one: self._label.get(one, _NOBODY + one) for one in map(int, taken.ids)}
         for one, owner in zip(assigned.tolist(), step.owner.tolist(), strict=True):
             if owner > 0:
                 label[one] = owner

@@ -50,7 +50,9 @@ def retrack(
     causal = None if from_scratch else _Along(like, above, decision.causal)
     forced = None
     if from_scratch or changed.any():
-        given = np.stack([np.where(owner > 0, owner, -1), _more_to_come(owner, t), later], axis=1)
+        given = np.stack(
+            [np.where(owner > 0, owner, -1), _more_to_come(owner, t), later], axis=1, dtype=np.float64
+        )
         forced = _Along(like, above, np.where(changed, owner, 0), given)
     both, table = [one for one in (causal, forced) if one is not None], _Table(t, decision, changed)
     taken = with_progress(steps(detections), len(np.unique(detections.scan_t)))

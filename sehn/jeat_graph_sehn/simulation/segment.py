@@ -84,15 +84,20 @@ class SegmentSource(Protocol):
     @property
     def size_px(self) -> tuple[int, int]:
         """Width and height of the pictures."""
+        ...
 
     def calibration(self) -> dict[str, Any]:
         """Return the camera's calibration as plain values, for a YAML file."""
+        ...
 
     def calibration_of(self, index: int) -> dict[str, Any]:
         """Return the calibration of segment `index`; cameras may differ between segments."""
+        ...
 
     def settings(self) -> dict[str, Any]:
         """Return all settings as plain values, for a YAML file; with the index they define a segment."""
+        ...
 
     def segment(self, index: int) -> Iterator[SegmentStep]:
         """Yield the frames of segment `index`, which has traffic and noise of its own."""
+        ...

@@ -63,4 +63,4 @@ def asking_for_far(truth: GroundTruth, folder: Path, least_px: float) -> GroundT
 
 def _keys(t: FloatArray, object_id: IntArray) -> npt.NDArray[np.complex128]:
     """Return one sortable value a vehicle and time: microseconds, then its number."""
-    return np.rint(t * _US_PER_S) + 1j * object_id
+    return np.asarray(np.rint(t * _US_PER_S) + 1j * object_id, dtype=np.complex128)

@@ -173,7 +173,7 @@ def _runs(segment: EventSegment, shape: NetSettings, most: int) -> list[_Run]:
     times = segment.truth.times
     if segment.truth.own_times:
         apart = np.unique(np.searchsorted(times, np.arange(times[0], times[-1] + _APART_S, _APART_S)))
-        labels = [times[k] for k in apart.tolist() if k < len(times)]
+        labels: list[float] = times[apart[apart < len(times)]].tolist()
         ends = [(shape.bins + k * _STEP_BINS) * bin_us for k in range(_LEADING)]
         return [_Run(round(t * _US) - ends[-1], ends, 1) for t in _evenly(labels, most)]
     first_us = int(max(times[0] * _US - shape.bins * bin_us, 0.0)) // bin_us * bin_us

@@ -141,4 +141,4 @@ def cut_out(
     if light.grey:
         values = np.repeat((values @ _LUMA)[..., None], 3, axis=-1)
     values = values + np.float32(light.sigma) * rng.standard_normal(values.shape, dtype=np.float32)
-    return np.ascontiguousarray(np.clip(values, 0.0, 1.0).transpose(2, 0, 1))
+    return np.ascontiguousarray(np.clip(values, 0.0, 1.0).transpose(2, 0, 1), dtype=np.float32)

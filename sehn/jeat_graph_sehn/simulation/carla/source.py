@@ -184,9 +184,12 @@ class CarlaSource:
         events.begin(round(start_s * _NS_PER_S), tick + 1)
         waiting: tuple[int, SegmentStep] | None = None
         for _ in range(self.frames + 1):  # one more, for the events of the last frame to arrive
-            for _ in range(config.ticks_per_frame):
+            for _ in range(config.ticks_per_frame - 1):  # between frames pictures come too
                 tick = world.tick()
-                image, depth_image = rgb.of_tick(tick), depth.of_tick(tick)
+                rgb.of_tick(tick)
+                depth.of_tick(tick)
+            tick = world.tick()
+            image, depth_image = rgb.of_tick(tick), depth.of_tick(tick)
             if waiting is not None:
                 at, step = waiting
                 yield dataclasses.replace(step, events=events.until_tick(at, step.t_us))

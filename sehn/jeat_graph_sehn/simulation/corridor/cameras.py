@@ -89,7 +89,8 @@ def see(driven: Driven, place: int, clock_s: float, errors: CameraErrors, rng: n
     pick = rng.integers(0, max(len(rows), 1), false) if len(rows) else np.zeros(0, dtype=np.int64)
     at = np.concatenate([at, rng.uniform(start, end, len(pick))])
     vehicle = np.concatenate([rows, np.full(len(pick), -1)])
-    speed, lane, length = (np.concatenate([v, v[pick]]) for v in (speed, lane, length))
+    speed, length = (np.concatenate([v, v[pick]]) for v in (speed, length))
+    lane = np.concatenate([lane, lane[pick]])
     order = np.argsort(at, kind="stable")
     sigma = np.hypot(errors.sigma_speed, errors.scale) * speed
     return Seen(at[order], speed[order], sigma[order], lane[order], length[order], vehicle[order])

@@ -101,7 +101,7 @@ def add_body(
             a = column0 + c + 0.5
             cover = 1.0
             for k in range(sides):
-                at = active[k]
+                at = int(active[k])
                 cover *= clamp01(body[at] * a + body[at + 1] * b + body[at + 2])
                 if cover <= 0.0:
                     break

@@ -121,7 +121,7 @@ def carla_advance(
         sink: where events go; it must have room.
     """
     for n in range(len(pixels)):
-        i = pixels[n]
+        i = int(pixels[n])
         clean, now = look_at(i, luminance[n], model, state.random)
         before, clean_before = state.previous[i], state.clean[i]
         state.previous[i], state.clean[i] = now, clean

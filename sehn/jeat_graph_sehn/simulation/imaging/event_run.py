@@ -251,7 +251,7 @@ def run_physical(
             top, stack[0] = 0, k + coarse
             done = k
             while top >= 0:
-                here = stack[top]
+                here = int(stack[top])
                 if not painted[top]:
                     touched = any_touch(here * stride - 1, who, counts, stage, row0, column0)
                     if constant and not touched:
@@ -277,7 +277,7 @@ def run_physical(
                     painted[top] = False
                     continue
                 sink = with_room(sink, room)
-                a, b = times_us[done * stride], times_us[here * stride]
+                a, b = float(times_us[done * stride]), float(times_us[here * stride])
                 since[:] = a
                 advance(pixels[:count], seen[top, :count], since, b, False, model, state, sink)
                 painted[top] = False

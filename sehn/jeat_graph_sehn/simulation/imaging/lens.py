@@ -109,7 +109,8 @@ class Lens:
     def _moves(self, t: float, exposure_s: float) -> float:
         """How far the mount takes the picture within an exposure (px)."""
         turns = self.sway.angles(np.array([t - 0.5 * exposure_s, t + 0.5 * exposure_s])[:, None, None])
-        return self.canvas.fx * float(np.hypot(*np.diff(turns[:, :2], axis=0).ravel()))
+        across, up = np.diff(turns[:, :2], axis=0).ravel()
+        return self.canvas.fx * float(np.hypot(across, up))
 
     def nearest(self, picture: IntArray, t: float) -> IntArray:
         """What the pixels' centres see at a time (s) of numbers (Hc, Wc) on the canvas: (H, W)."""

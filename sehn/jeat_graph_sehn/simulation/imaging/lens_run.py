@@ -98,14 +98,15 @@ def run_lens(
                 due[dues] = s
                 dues += 1
         for k in range(dues):
-            s = due[k]
+            s = int(due[k])
             waiting[s] = False
             for row in range(foot[s, 0], foot[s, 1] + 1):
                 for column in range(foot[s, 2], foot[s, 3] + 1):
                     n = row * across + column
                     if end[n] >= 0 and fresh[n] != step:
                         fresh[n] = step
-                        _bring(tiles[n, 0], tiles[n, 1], (step - begin[n]) / (end[n] - begin[n]), pictures)
+                        share = float((step - begin[n]) / (end[n] - begin[n]))
+                        _bring(tiles[n, 0], tiles[n, 1], share, pictures)
             sink = with_room(sink, room)
             following = _look(s, last[s], step, work, sight, pictures.now, model, state, sink)
             if step == count:

@@ -86,7 +86,7 @@ def _on_ground(
         brightest = nearest = math.inf
         if whole:
             brightest = 0.0
-            beams_at(corner, (x, y, sin, cos), (fade[v], limit2, peak, stray), shone)
+            beams_at(corner, (x, y, sin, cos), (float(fade[v]), limit2, peak, stray), shone)
             for k in range(4):
                 dx, dy = corner[0, k] - x, corner[1, k] - y
                 nearest = min(nearest, dx * dx + dy * dy + lift2)
@@ -107,7 +107,7 @@ def _on_ground(
         # Whether beams matter on this tile is told by its corners, unless these are near the lamps.
         if not near and value[n, 4] < enough:
             continue
-        lamp, shine = (x, y, pose[v, 2], pose[v, 3]), (fade[v], limit2, peak, stray)
+        lamp, shine = (x, y, pose[v, 2], pose[v, 3]), (float(fade[v]), limit2, peak, stray)
         blocked = before(v, x, y, min(value[n, 2], limit), pose, fade, skin, blockers)
         if near:
             if not have_pixels:

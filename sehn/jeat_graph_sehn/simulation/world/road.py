@@ -54,7 +54,7 @@ class Road:
         edge = config.median_m / 2.0 + width * n + config.shoulder_m / 2.0
         return Road(
             config=config,
-            lane_x=np.concatenate([-right[::-1], right]),
+            lane_x=np.concatenate([-right[::-1], right], dtype=np.float64),
             direction=np.repeat(np.array([-1, 1], dtype=np.int64), n),
             shoulder_x=np.array([-edge, edge]),
         )
