@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import replace
 
 from jeat_graph.config.schema import Config
@@ -47,7 +46,7 @@ def _solver_of(config: Config) -> Solver:
     return GtsamLag() if config.smoother.engine in LAGGED else GtsamFull()
 
 
-class SmoothsRecords(ABC):
+class SmoothsRecords:
     """The part of an engine that smooths: in NumPy, over its `StepRecord`s.
 
     Args:
@@ -56,14 +55,18 @@ class SmoothsRecords(ABC):
 
     def __init__(self, histories: Histories | None) -> None:
         self._histories = histories
+        self._last: StepRecord | None = None  # of an engine in NumPy, whose step makes it
 
-    @abstractmethod
     def record(self) -> Recorded:
         """Return what the last step gave the smoother."""
+        assert self._last is not None, "a step has been taken"
+        return self._last
 
-    @abstractmethod
     def step_record(self, record: Recorded) -> StepRecord:
         """Return the states of a step."""
+        if not isinstance(record, StepRecord):
+            raise TypeError("this record is of another engine")
+        return record
 
     def hand_over(
         self,

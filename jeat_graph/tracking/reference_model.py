@@ -19,7 +19,7 @@ from jeat_graph.filters.score_calibration import logit
 from jeat_graph.filters.singer import STATES
 from jeat_graph.smoothers.histories import StepRecord
 from jeat_graph.smoothers.rows import Called, ModelRows, joined, rows_of
-from jeat_graph.tracking.engine import LONGEST_SILENCE_S, Moment, Recorded, StepInput, lacking
+from jeat_graph.tracking.engine import LONGEST_SILENCE_S, Moment, StepInput, lacking
 from jeat_graph.tracking.one_model import Learnt, OneModel, given_of, row_output
 from jeat_graph.tracking.reference import step
 from jeat_graph.tracking.reference_life import reset
@@ -67,7 +67,6 @@ class ReferenceModel(OneModel):
         size = float(config.image.width), float(config.image.height)
         self._state = initial_state(size if config.input.picture == "given" else None, constants)
         self._output = row_output(constants)
-        self._last: StepRecord | None = None
         self._answer = _no_answer()
 
     def declare_sensor(self, name: str, declared: SensorConfig) -> None:
@@ -115,17 +114,6 @@ class ReferenceModel(OneModel):
         flags = tracks.real, tracks.used, confirmed, missed, kept
         gaps = done.gaps, self._state.gaps
         self._last = StepRecord(t, is_reset, tracks.track_id, done.records, *flags, *gaps, later)
-
-    def record(self) -> StepRecord:
-        """Return what the last step gave the smoother."""
-        assert self._last is not None, "a step has been taken"
-        return self._last
-
-    def step_record(self, record: Recorded) -> StepRecord:
-        """Return the states of a step."""
-        if not isinstance(record, StepRecord):
-            raise TypeError("this record is of another engine")
-        return record
 
     def reset(self, t: float) -> None:
         """End all tracks and go on from another time (s), as if none had passed; what was learnt stays."""

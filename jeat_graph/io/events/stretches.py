@@ -86,15 +86,7 @@ class ForwardStretches:
     """Reads a file forwards and keeps what may still be asked for; a step back reads it anew.
 
     Args:
-        path: the file.
-        size_px: width and height of the picture, where the file does not say.
-        layout: columns, unit of time and recording, where the file leaves that open.
-        beside_px: width and height of frames of the same scene, taken if nothing says the size and events lie
-            in them.
-
-    Raises:
-        ConfigError: an extra package is needed for this format.
-        DataError: it cannot be read.
+        path: the file; the others, and errors, as of `open_stretches`.
     """
 
     def __init__(

@@ -86,7 +86,7 @@ def open_source(
     Args:
         url: the address.
         overdue: tells when the program is to end; then nothing is waited for any longer.
-        tell: takes each line for the user; called by whoever calls the source.
+        tell: takes each line for the user; called by whoever calls the source or sink.
         notices: takes them instead of `tell`, and knows whether there is a connection.
 
     Raises:
@@ -101,18 +101,7 @@ def open_source(
 def open_sink(
     url: str, overdue: Overdue = never, tell: Tell = say_nothing, notices: Notices | None = None
 ) -> Sink:
-    """Open the sink at an address.
-
-    Args:
-        url: the address.
-        overdue: tells when the program is to end; then nothing is waited for any longer.
-        tell: takes each line for the user; called by whoever calls the sink.
-        notices: takes them instead of `tell`, and knows whether there is a connection.
-
-    Raises:
-        ConfigError: the address is not valid, or the client's package is missing.
-        JeatGraphError: nobody answers at the address.
-    """
+    """Open the sink at an address; arguments and errors as of `open_source`."""
     address = sink_address(url)
     notices = _before_opening(address, notices or Notices(tell))
     return brokers()[address.scheme].open_sink(address, overdue, notices)

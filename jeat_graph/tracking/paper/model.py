@@ -16,7 +16,7 @@ from jeat_graph.filters import gap_survival
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.histories import Existence, StepRecord
 from jeat_graph.smoothers.rows import REPORTED, Called, ModelRows, RowOutput, rows_of
-from jeat_graph.tracking.engine import LONGEST_SILENCE_S, Moment, Recorded, StepBoxes, StepInput, lacking
+from jeat_graph.tracking.engine import LONGEST_SILENCE_S, Moment, StepBoxes, StepInput, lacking
 from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.paper.kalman import predict
 from jeat_graph.tracking.paper.state import MOST_LOG_SIZE, Found, PaperTracks, together
@@ -78,7 +78,6 @@ class PaperModel(SmoothsRecords):
         none = np.zeros(0, dtype=np.int64)
         self._now = PaperMoment(None, 1, PaperTracks.none(0), (), np.zeros(0), none, none)
         self._declared: dict[str, SensorConfig] = {}
-        self._last: StepRecord | None = None
 
     def declare_sensor(self, name: str, declared: SensorConfig) -> None:
         """Add a sensor that has had no scan yet."""
@@ -209,17 +208,6 @@ class PaperModel(SmoothsRecords):
     def hypotheses(self, t: float, shown: IntArray, sensors: tuple[str, ...]) -> Hypotheses:
         """Refuse: a track is confirmed or not."""
         raise lacking(self.name, "weighs no hypotheses: a track is confirmed or not")
-
-    def record(self) -> StepRecord:
-        """Return what the last step gave the smoother."""
-        assert self._last is not None, "a step has been taken"
-        return self._last
-
-    def step_record(self, record: Recorded) -> StepRecord:
-        """Return the states of a step."""
-        if not isinstance(record, StepRecord):
-            raise TypeError("this record is of another engine")
-        return record
 
     def state(self, moment: Moment | None = None) -> Mapping[str, Any]:
         """Refuse: a run with this engine is short enough to begin again."""

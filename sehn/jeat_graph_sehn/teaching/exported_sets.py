@@ -15,21 +15,19 @@ layout    written                                                        what is
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.io.files.atomic import naming
+from jeat_graph.data.errors import ConfigError
 from jeat_graph_sehn.teaching.coco_set import write_coco_set
 from jeat_graph_sehn.teaching.dsec_set import write_dsec_set
 from jeat_graph_sehn.teaching.lesson import Lesson
 from jeat_graph_sehn.teaching.recordings import EventRecording
 from jeat_graph_sehn.teaching.stills import Stills, stills_of
 from jeat_graph_sehn.teaching.yolo_set import write_yolo_set
+from jeat_graph_sehn.whole_folder import whole_folder
 
 OF_PICTURES: Mapping[str, Callable[[Mapping[str, Stills], Path], None]] = {
     "coco": write_coco_set,
@@ -83,28 +81,15 @@ def write_set(lesson: Lesson, request: SetRequest) -> SetWritten:
     Raises:
         DataError: the folder is there and not empty, or something cannot be read or written.
     """
-    target = request.out
-    if target.exists() and (not target.is_dir() or any(target.iterdir())):
-        raise DataError("is there already and not empty; choose another folder", target)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    partial = target.with_name(f".{target.name}.unfinished")
-    shutil.rmtree(partial, ignore_errors=True)  # what a killed run left
-    try:
-        with naming(target):
-            partial.mkdir()
-            if request.video is not None:
-                parts = {
-                    name: stills_of(labels, request.video)
-                    for name, labels in zip(("train", "val"), lesson.parts, strict=True)
-                }
-                OF_PICTURES[request.layout](parts, partial)
-            else:
-                assert request.events is not None
-                write_dsec_set(lesson.parts, request.events, partial)
-            if target.exists():
-                target.rmdir()
-            os.rename(partial, target)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    with whole_folder(request.out) as folder:
+        if request.video is not None:
+            parts = {
+                name: stills_of(labels, request.video)
+                for name, labels in zip(("train", "val"), lesson.parts, strict=True)
+            }
+            OF_PICTURES[request.layout](parts, folder)
+        else:
+            assert request.events is not None
+            write_dsec_set(lesson.parts, request.events, folder)
     asked = [int((~labels.truth.ignore).sum()) for labels in lesson.parts]
     return SetWritten(*asked)

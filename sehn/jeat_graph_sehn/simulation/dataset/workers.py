@@ -61,17 +61,6 @@ def make_segments(
         for index in indices:
             yield write_segment(source, index, root, protocol, lambda: on_frames(1))
         return
-    yield from _in_processes(factory, root, protocol, indices, workers, on_frames)
-
-
-def _in_processes(
-    factory: SourceFactory,
-    root: Path,
-    protocol: Protocol,
-    indices: Sequence[int],
-    workers: int,
-    on_frames: Callable[[int], object],
-) -> Generator[dict[str, Any], None, None]:
     with safe_start():
         counter = multiprocessing.get_context("spawn").Value("q", 0)
     threads = max(1, available_cores() // workers)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from jeat_graph.data.errors import ConfigError, DataError
-from jeat_graph.io.files.atomic import naming
+from jeat_graph.data.errors import ConfigError
 from jeat_graph_sehn.simulation.layouts.dsec_det import write_dsec_det, write_split
 from jeat_graph_sehn.simulation.layouts.rvt import write_rvt
 from jeat_graph_sehn.simulation.layouts.rvt_input import write_rvt_input
 from jeat_graph_sehn.simulation.layouts.sets import open_set
+from jeat_graph_sehn.whole_folder import whole_folder
 
 LAYOUTS = {"rvt": write_rvt, "rvt-input": write_rvt_input, "dsec-det": write_dsec_det}
 
@@ -47,26 +45,13 @@ def write_layout(
     """
     if layout not in LAYOUTS:
         raise ConfigError(f"layout: must be one of {', '.join(LAYOUTS)}, not {layout!r}")
-    whole, target = open_set(root), Path(out)
-    if target.exists() and (not target.is_dir() or any(target.iterdir())):
-        raise DataError("is there already and not empty; choose another folder", target)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    partial = target.with_name(f".{target.name}.unfinished")
-    shutil.rmtree(partial, ignore_errors=True)  # what a killed run left
-    try:
-        with naming(target):
-            partial.mkdir()
-            for split in ("train", "test") if layout == "dsec-det" else ("train", "val", "test"):
-                (partial / split).mkdir()
-            written = 0
-            for segment in whole.segments:
-                written += LAYOUTS[layout](segment, whole.size_px, partial)
-                on_segment()
-            if layout == "dsec-det":
-                write_split(whole.segments, partial)
-            if target.exists():
-                target.rmdir()
-            os.rename(partial, target)
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    whole, written = open_set(root), 0
+    with whole_folder(Path(out)) as folder:
+        for split in ("train", "test") if layout == "dsec-det" else ("train", "val", "test"):
+            (folder / split).mkdir()
+        for segment in whole.segments:
+            written += LAYOUTS[layout](segment, whole.size_px, folder)
+            on_segment()
+        if layout == "dsec-det":
+            write_split(whole.segments, folder)
     return LayoutWritten(written, len(whole.segments) - written)
