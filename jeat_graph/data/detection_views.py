@@ -17,6 +17,9 @@ from jeat_graph.data.tables.reading import Reading, ReadingOptions
 from jeat_graph.data.to_supervision import supervision_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy.typing as npt
     import pandas as pd
 
     from jeat_graph.data.detections import Detections
@@ -40,6 +43,19 @@ class DetectionViews:
 
         def motion_rows(self) -> FloatArray | None:
             """The camera's motion in the first of each scan's rows."""
+            ...
+
+        @staticmethod
+        def from_rows(
+            t: npt.ArrayLike,
+            sensor: Sequence[str] | TextArray,
+            boxes: npt.ArrayLike,
+            scores: npt.ArrayLike,
+            empty: npt.ArrayLike | None = None,
+            classes: TextArray | None = None,
+            /,
+        ) -> Detections:
+            """Group rows into scans."""
             ...
 
         @staticmethod
@@ -98,8 +114,8 @@ class DetectionViews:
         """
         return cls.from_table(rows_of_frame(frame, Reading(**options), sensor))
 
-    @staticmethod
-    def from_supervision(source: Any, *, t: float, sensor: str = "rgb") -> Detections:
+    @classmethod
+    def from_supervision(cls, source: Any, *, t: float, sensor: str = "rgb") -> Detections:
         """Take `supervision.Detections` of one picture as a scan; `concatenate` joins those of a video.
 
         Args:
@@ -107,15 +123,11 @@ class DetectionViews:
             t: time of the picture (s).
             sensor: name of the sensor.
         """
-        from jeat_graph.data.detections import Detections
-
         boxes, scores, classes, kept, _ = boxes_of(source)
         if len(boxes):
-            out = Detections.from_rows(
-                np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes
-            )
+            out = cls.from_rows(np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes)
         else:
-            out = Detections.from_rows([t], [sensor], np.full((1, 4), np.nan), [np.nan], [True])
+            out = cls.from_rows([t], [sensor], np.full((1, 4), np.nan), [np.nan], [True])
         return replace(out, dropped=int(np.sum(~kept)))
 
     def to_supervision(self) -> Any:
