@@ -79,4 +79,5 @@ class CameraPath(NamedTuple):
 
 def _rate(camera: CameraVelocity, picture: tuple[float, float]) -> FloatArray:
     """Return the velocity (2,) of the middle of the picture (px/s)."""
-    return displacement(camera.rate, camera.centre, np.array([picture]) / 2.0)[0]
+    middle = displacement(camera.rate, camera.centre, np.array([picture]) / 2.0)
+    return np.asarray(middle[0], dtype=np.float64)

@@ -25,7 +25,7 @@ LAYERS = (
     ("smoothers",),
     ("data",),
     ("config", "configs"),
-    ("io.files", "io.tables", "io.formats"),
+    ("io.files", "io.event_cameras", "io.tables", "io.formats"),
     ("io.streams", "io.events"),
     ("io.media",),
     ("io.capture",),

@@ -51,14 +51,14 @@ class RoboflowTracker:
         ids, scores, sensors = (np.zeros(0) if column is None else column for column in given)
         # The tracker returns every detection; those that belong to no confirmed track have the identity -1.
         good = ids >= 0
-        ids = np.asarray(ids[good], dtype=np.int64)
+        track_id = np.asarray(ids[good], dtype=np.int64)
         box = out.xyxy[good].astype(np.float64)
         return TrackedFrame(
-            track_id=ids,
+            track_id=track_id,
             boxes=np.concatenate((box[:, :2], box[:, 2:] - box[:, :2]), axis=1),
             scores=scores[good].astype(np.float64),
             used=np.left_shift(1, sensors[good].astype(np.int64)),
-            velocity=_velocities(self._tracker, ids, self._rate_hz),
+            velocity=_velocities(self._tracker, track_id, self._rate_hz),
         )
 
 

@@ -188,7 +188,7 @@ def _shown(value: Any) -> str:
     return f"`{value:.15g}`" if isinstance(value, float) else f"`{value}`"
 
 
-_ABOUT_RECORDS = """# Formats, exports, brokers, scores and protocols
+_ABOUT_RECORDS = """# Formats, exports, brokers, event cameras, scores and protocols
 
 Made from the records in the code, one in a file of its own; `CONTRIBUTING.md` says how to add one.
 """
@@ -199,6 +199,7 @@ def records_page() -> str:
     from jeat_graph.eval.metrics import metrics
     from jeat_graph.eval.protocols.registry import protocols
     from jeat_graph.exporting.registry import exports
+    from jeat_graph.io.event_cameras.registry import event_cameras
     from jeat_graph.io.formats.registry import formats
     from jeat_graph.live.transport.brokers.registry import brokers
 
@@ -218,6 +219,7 @@ def records_page() -> str:
             [", ".join(f"`{k}`" for k in kind) for kind in (one.source_options, one.sink_options)]
         ]
     ]
+    cameras = [(one.maker, ", ".join(f"`{k}`" for k in one.forms)) for one in event_cameras().values()]
     return "\n".join(
         [
             _ABOUT_RECORDS,
@@ -231,6 +233,9 @@ def records_page() -> str:
             "## Brokers\n",
             "Where `stream` and `serve` take scans from and send tracks to ([how](../guides/live.md)).\n",
             *_table(("broker", "address, port", "encrypted", "options of a source", "of a sink"), ends),
+            "## Event cameras\n",
+            "What `--events` may name beside files ([how](../guides/live.md)).\n",
+            *_table(("camera of", "address"), cameras),
             "## Scores\n",
             *_table(("score", "unit", "meaning"), scores),
             "## Protocols\n",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from jeat_graph.cli.detect_options import DEFAULT, add_detector_options
 from jeat_graph.config.argument_types import positive
+from jeat_graph.io.event_cameras.registry import address_forms
 
 if TYPE_CHECKING:
     from jeat_graph.detection.live_detecting import LiveDetecting
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 #: What `--frames` and `--events` may name beside files, for help.
 CAMERAS = "rtsp:// or http:// address, /dev/video0 or 0"
-EVENT_CAMERAS = "dv://HOST:PORT, dv: or metavision:"
+EVENT_CAMERAS = address_forms()
 
 
 def add_duration(parser: argparse._ActionsContainer) -> None:

@@ -21,6 +21,10 @@ class TimeOrderError(JeatGraphError):
     """A scan older than one that has been processed already."""
 
 
+class LostError(JeatGraphError):
+    """A camera that cannot be reached, or whose connection has broken off."""
+
+
 class OtherRunError(JeatGraphError):
     """A run that was broken off and cannot be gone on with: its state is another's, or damaged."""
 

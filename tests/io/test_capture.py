@@ -11,11 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.errors import ConfigError, DataError, LostError
 from jeat_graph.io.capture.back_off import BackOff
-from jeat_graph.io.capture.reader import LiveReader, LostError
+from jeat_graph.io.capture.event_camera import open_event_camera
+from jeat_graph.io.capture.reader import LiveReader
 from jeat_graph.io.capture.stream_clock import StreamClock
 from jeat_graph.io.capture.wall_clock import WallClock
+from jeat_graph.io.event_cameras.record import EventCameraKind
+from jeat_graph.io.event_cameras.registry import event_cameras
 from jeat_graph.io.events.opening import open_events
 from jeat_graph.io.files.addresses import events_address, frames_address, is_live
 from jeat_graph.io.media.video import open_frames, peek
@@ -110,6 +113,24 @@ class FakeCamera:
 
 def forever():
     time.sleep(0.05)
+
+
+class TestLiveEvents:
+    def test_no_event_comes_before_those_of_the_piece_before(self, monkeypatch):
+        """The third piece arrives early: what it was taken to be late by falls by a hundredth of its step."""
+        rows = [("t", "i8"), ("x", "u2"), ("y", "u2"), ("p", "u1")]
+        pieces = [[0, 10_000], [10_010, 20_000], [20_010, 30_000]]
+        items = [np.array([(t, 1, 2, 1) for t in piece], dtype=rows) for piece in pieces]
+        camera = FakeCamera([[*items, *[forever] * 999]])
+        camera.size_px = (4, 3)
+        kind = EventCameraKind("fake", ("fake:",), "", "t", "p", 0, lambda _: camera.connect())
+        monkeypatch.setitem(event_cameras(), "fake", kind)
+        arrivals = iter([100.0, 100.02, 100.0225])
+        with open_event_camera(events_address("fake:"), lambda _: None, now=lambda: next(arrivals)) as reader:
+            # The first piece may have waited in a store: nothing says when it was taken.
+            second, third = reader.take(5.0), reader.take(5.0)
+        assert second.events.t_us.tolist() == [100_010_010, 100_020_000]
+        assert third.events.t_us.tolist() == [100_020_000, 100_029_900]  # and not from 100_019_910 on
 
 
 class TestLiveReader:

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jeat_graph.data.errors import DataError
-from jeat_graph.io.capture.reader import LiveReader, LostError
+from jeat_graph.data.errors import DataError, LostError
+from jeat_graph.io.capture.reader import LiveReader
 from jeat_graph.io.capture.stream_clock import StreamClock
 from jeat_graph.io.capture.wall_clock import WallClock
 from jeat_graph.io.files.addresses import LiveAddress

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, Self, TypeVar
 
-from jeat_graph.data.errors import JeatGraphError
+from jeat_graph.data.errors import LostError
 from jeat_graph.io.capture.back_off import BackOff
 
 Item = TypeVar("Item")
@@ -21,10 +21,6 @@ MOST_WAITING = 2
 _SLICE_S = 0.1
 #: A thread that hangs in a library is not waited for longer than this (s).
 _LEAVE_S = 2.0
-
-
-class LostError(JeatGraphError):
-    """A camera that cannot be reached, or whose connection has broken off."""
 
 
 class Capture(Protocol[_Given]):

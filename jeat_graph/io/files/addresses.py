@@ -10,14 +10,12 @@ from urllib.parse import SplitResult, parse_qsl, quote, urlencode, urlsplit
 
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.data.secrets import Secret, shown_url
+from jeat_graph.io.event_cameras.registry import address_forms, event_cameras
 from jeat_graph.io.files.credentials import PASSWORD_FILE, login_text, password_from
 
 #: Ports of network streams that have one by themselves.
 PORTS = {"rtsp": 554, "rtsps": 322, "http": 80, "https": 443, "rtmp": 1935}
 _STREAMS = (*PORTS, "udp")
-#: Port that iniVation's programs serve events at.
-_DV_PORT = 9090
-_EVENT_LIBRARIES = ("dv", "metavision")
 _DEVICE = re.compile(r"\d{1,3}|/dev/video\d+")
 
 
@@ -26,7 +24,8 @@ class LiveAddress:
     """A camera; shown in any way it has neither user, password nor query.
 
     Attributes:
-        kind: `stream` (network video), `device` (a camera of this machine), `dv` or `metavision`.
+        kind: `stream` (network video), `device` (a camera of this machine), or
+            the scheme of an event camera.
         shown: the address as it may be shown.
         opened: what the library that opens it takes, secrets and all.
         host: name or number of the camera, empty for one of this machine.
@@ -52,7 +51,7 @@ def is_live(text: object) -> bool:
     if _DEVICE.fullmatch(words):
         return words.startswith("/dev/") or not Path(words).exists()
     scheme, colon, rest = words.partition(":")
-    if scheme.lower() in _EVENT_LIBRARIES and colon:
+    if colon and scheme.lower() in event_cameras():
         return not Path(words).exists()
     return scheme.lower() in _STREAMS and rest.startswith("//")
 
@@ -82,25 +81,24 @@ def frames_address(text: str) -> LiveAddress:
 
 
 def events_address(text: str) -> LiveAddress:
-    """Take the address of an event camera apart: `dv://HOST[:PORT]`, `dv:[NAME]` or `metavision:[SERIAL]`.
+    """Take the address of an event camera apart: `SCHEME:[NAME]`, or `SCHEME://HOST[:PORT]`.
 
     Raises:
         ConfigError: what is wrong.
     """
     scheme, _, rest = text.partition(":")
-    scheme = scheme.lower()
-    if scheme not in _EVENT_LIBRARIES:
-        _refuse(text, "is no camera of events: dv://HOST:PORT, dv:NAME or metavision:SERIAL is")
+    kind = event_cameras().get(scheme.lower())
+    if kind is None:
+        _refuse(text, f"is no camera of events: {address_forms()} is")
     if not rest.startswith("//"):
-        return LiveAddress(scheme, text, Secret(rest))
-    if scheme != "dv":
-        _refuse(text, "has no network address: metavision:SERIAL is a camera of this machine")
+        return LiveAddress(kind.scheme, text, Secret(rest))
+    if not kind.port:
+        _refuse(text, f"has no network address: {kind.forms[0]} is a camera of this machine")
     parts = _split(text)
     if parts.username or parts.password or parts.query:
         _refuse(text, "takes no user, password or option")
-    return LiveAddress(
-        "dv", shown_url(text), Secret(""), parts.hostname or "", _port(parts, text) or _DV_PORT
-    )
+    port = _port(parts, text) or kind.port
+    return LiveAddress(kind.scheme, shown_url(text), Secret(""), parts.hostname or "", port)
 
 
 def _split(text: str) -> SplitResult:

@@ -1,0 +1,1 @@
+"""Event cameras that are on: one module each."""
