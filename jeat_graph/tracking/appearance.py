@@ -66,6 +66,8 @@ class Appearances(NamedTuple):
     def among(self, num_sensors: int) -> Appearances:
         """Return the same where there are more sensors, which have seen nothing yet."""
         more = num_sensors - len(self.moments)
+        if not more:
+            return self
         mean = np.pad(self.mean, ((0, 0), (0, more), (0, 0)))
         return Appearances(self.track_id, mean, np.pad(self.moments, ((0, more), (0, 0), (0, 0))))
 

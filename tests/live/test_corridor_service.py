@@ -181,6 +181,9 @@ def test_a_good_file_is_valid_and_nothing_is_made(checked, tmp_path):
         ("A: , B: , C: ", "A: ", "cameras: a corridor has two or more"),
         ("folder: state", "folder: lines.yaml/x", "state.checkpoint: "),
         ("interval_s: 30", "clocks: own", "corridor.clocks: 'own'"),
+        ("{camera}/scans", "scans", "cameras.B.sources[0]: nats://broker/scans is that of camera A, too"),
+        ("B: ,", "B: {sinks: [{url: 'nats://broker/C/scans'}]},", "would come back as scans"),
+        ("nats://broker/found", "nats://broker/B/scans", "cameras.B.sources[0].url, corridor.sinks[0]: "),
     ],
 )
 def test_what_would_end_a_start_is_said_before(old, new, words, checked):

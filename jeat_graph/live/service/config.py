@@ -235,9 +235,9 @@ def check_service(config: ServiceConfig, *, needs_sinks: bool = True) -> None:
             raise ConfigError(f"{where}.sensor: {name!r} is another camera's, too; give each its own")
         sensors |= {name} if name is not None else set()
     for k, sink in enumerate(config.sinks):
-        _check_broker(f"sinks[{k}].url", None, sink)
+        check_broker(f"sinks[{k}].url", None, sink)
         for j, source in enumerate(config.sources):
-            _check_broker(f"sources[{j}].url", source, sink)
+            check_broker(f"sources[{j}].url", source, sink)
 
 
 def sensor_of(source: SourceConfig) -> str | None:
@@ -274,7 +274,7 @@ def _check_source(source: SourceConfig, where: str) -> None:
         raise ConfigError(f"{where}.{kind}: {error}") from None
 
 
-def _check_broker(where: str, source: SourceConfig | None, sink: SinkConfig) -> None:
+def check_broker(where: str, source: SourceConfig | None, sink: SinkConfig) -> None:
     """Refuse addresses that are none, or that are in each other's way."""
     one = to = None
     if source is not None and source.url is not None:

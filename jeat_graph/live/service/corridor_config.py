@@ -16,6 +16,7 @@ from jeat_graph.corridor.corridor_file import read_learnt_gaps
 from jeat_graph.corridor.handover import KnownGap, chain
 from jeat_graph.corridor.learnt_gap import LearntGap
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.secrets import shown_url
 from jeat_graph.live.service.config import (
     STDOUT,
     ServiceConfig,
@@ -23,6 +24,7 @@ from jeat_graph.live.service.config import (
     StateConfig,
     WebConfig,
     built,
+    check_broker,
     check_service,
     read_service_tree,
     resolved,
@@ -201,9 +203,32 @@ def _made(tree: Mapping[str, Any], folder: Path) -> CorridorConfig:
     shell = resolved(built({"sinks": sinks}), folder)
     if sum(sink.url == STDOUT for sink in shell.sinks) > 1:
         raise ConfigError("corridor.sinks: standard output is named twice")
+    _check_apart(cameras, shell.sinks)
     web: WebConfig = build(WebConfig, _mapping(tree, "web"), "web.")
     found = replace(found, learnt=str(folder / found.learnt))
     return CorridorConfig(name, cameras, roads, found, shell.sinks, state, web)
+
+
+def _check_apart(cameras: Mapping[str, ServiceConfig], sinks: Sequence[SinkConfig]) -> None:
+    """See that no camera takes what is another's: its scans, its tracks, or what is found of the corridor.
+
+    Raises:
+        ConfigError: one does.
+    """
+    owner: dict[str, str] = {}
+    ends = [(f"cameras.{name}.sinks", one.sinks) for name, one in cameras.items()]
+    for name, one in cameras.items():
+        for k, source in enumerate(one.sources):
+            where, (_, address) = f"cameras.{name}.sources[{k}]", source.given
+            if address in owner:
+                raise ConfigError(
+                    f"{where}: {shown_url(address)} is that of camera {owner[address]}, too; give each "
+                    f"its own ({_NAME} stands for the name)"
+                )
+            owner[address] = name
+            for key, own in [*ends, ("corridor.sinks", sinks)]:
+                for j, sink in enumerate(own):
+                    check_broker(f"{where}.url, {key}[{j}]", source, sink)
 
 
 def _mapping(tree: Mapping[str, Any], key: Any, where: str = "") -> dict[str, Any]:

@@ -161,7 +161,7 @@ class CorridorService:
             return
         state = {"version": _VERSION, "seq": sinks.seq, "corridor": self._live.state()}
         with open_atomic(path) as file:
-            json.dump(state, file)
+            file.write(json.dumps(state))  # in one piece: many times as fast as piece by piece
         for camera in self.cameras.values():
             camera.watch.saved()
         self._status.saved = time.monotonic()
