@@ -19,12 +19,14 @@ _ENOUGH_FOR_A_STEP = 10
 SCORE_SCALES = ("unit", "percent", "logistic")
 
 
-def check_rate(rate_hz: float, path: str | Path | None) -> float:
-    """Return a frame rate (Hz).
+def check_rate(rate_hz: float | None, path: str | Path | None) -> float:
+    """Return the frame rate (Hz) of a file that counts frames.
 
     Raises:
-        DataError: it is no number, or not positive and finite.
+        DataError: none is given, or it is no number, or not positive and finite.
     """
+    if rate_hz is None:
+        raise DataError("has frame numbers only; give their rate with --rate (in Python rate_hz)", path)
     if not isinstance(rate_hz, SupportsFloat):  # of a user in Python
         raise DataError(f"the frame rate must be a number (Hz), not {rate_hz!r:.40}", path)
     if not (math.isfinite(rate_hz) and rate_hz > 0):

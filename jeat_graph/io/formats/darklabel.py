@@ -48,8 +48,6 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
             labels.append(box[-1])
             frames.append(frame)
             lines.append(number)
-    if how.rate_hz is None:
-        raise DataError("has frame numbers only; give their rate with --rate (in Python rate_hz)", path)
     rate, numbers = check_rate(how.rate_hz, path), np.array(labelled, dtype=np.int64)
     first = first_frame(numbers, how.first_frame)
     if len(numbers) and numbers.min() < first:

@@ -176,8 +176,6 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
     """
     labels = read_labels(path, how)
     first = first_frame(labels.labelled, how.first_frame)
-    if how.rate_hz is None:
-        raise DataError("has frame numbers only; give their rate with --rate (in Python rate_hz)", path)
     rate = check_rate(how.rate_hz, path)
     if len(labels.labelled) and labels.labelled[0] < first:
         raise DataError(f"frames count from {first}, got {labels.labelled[0]}", path)

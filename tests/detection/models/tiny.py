@@ -17,7 +17,7 @@ def constant_net(path, outputs, side, channels=3, notes=None, batch=1):
     ]
     values = [
         numpy_helper.from_array(np.zeros((1, 1, 1, 1), np.float32), "zero"),
-        numpy_helper.from_array(np.array([1, 1, 1], np.int64), "one_side"),
+        numpy_helper.from_array(np.array([1], np.int64), "one_side"),
     ]
     ports = []
     for name, array in outputs.items():

@@ -165,8 +165,9 @@ class OutputLayout:
         detectors: which networks have it, for the page `docs/reference/layouts.md`, which is made of records.
         outputs: what its outputs look like, for that page.
         fit: tells how well it goes with a network.
-        decode: turns outputs into boxes; given the sides of the input (px), and how many of a row's numbers
-            are scores of classes, None for all.
+        decode: turns outputs, in the shapes that the network gives them with its batch of one, into boxes;
+            given the sides of the input (px), and how many of a row's numbers are scores of classes, None for
+            all. Classes count from 0.
         classes: tells how many classes the outputs have room for, None where nobody knows.
         feed: how its networks are usually fed.
         least_score: boxes below are left out, as the networks' own tools have it.
