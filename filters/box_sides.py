@@ -56,7 +56,7 @@ class SideInnovations(NamedTuple):
         S: (N, M, 2, 2, 2) its covariance by axis; sides that the edge of the picture cuts vary with the size.
         d2: (N, M, 2) squared Mahalanobis distance by axis.
         H: (N, 2, 2, 7) measurement matrix by axis.
-        side_variance: (N, 2) variance of one measured side by axis (px²).
+        side_variance: (N, M, 2, 2) variance of the measured sides (px²).
         unmeasured: (N, M, 2, 2) sides that measure nothing.
     """
 
@@ -148,6 +148,7 @@ def innovations(
     edges: BoolArray,
     log_variance: float,
     c: ModelConstants,
+    spread: FloatArray | None = None,
 ) -> SideInnovations:
     """Compare boxes (M, 4) with tracks: y = z − h(m), S = H P Hᵀ + R.
 
@@ -158,6 +159,7 @@ def innovations(
         edges: (M, 2, 2) which of their sides lie at the edge of the picture.
         log_variance: ln ρ² of the sensor's sides.
         c: constants.
+        spread: (N, M, 2, 2) what R of a side is more where the detector says it (`box_spread`, px²), or None.
     """
     size = expected_size(mean)
     H, R = measurement_matrix(size), side_variance(size, log_variance, c)
@@ -165,8 +167,10 @@ def innovations(
     y = by_axis(boxes)[None] - by_axis(expected_corners(mean))[:, None]
     unmeasured = unmeasured_sides(y, edges)
     more = cut_variance(unmeasured, size[:, None], c)
+    of_side = np.repeat(np.repeat(R[:, None, :, None], len(boxes), axis=1), 2, axis=3)
+    of_side, more = (of_side, more) if spread is None else (of_side + spread, more + spread)
     S = with_variance(np.repeat(S[:, None], len(boxes), axis=1), more[..., 0], more[..., 1])
-    return SideInnovations(y, S, squared_distance(y, S), H, R, unmeasured)
+    return SideInnovations(y, S, squared_distance(y, S), H, of_side, unmeasured)
 
 
 def at_edge(boxes: FloatArray, picture: tuple[float, float], c: ModelConstants) -> BoolArray:
@@ -247,7 +251,7 @@ def measured_variance(
     Args:
         y: (N, 2, 2) innovations.
         S: (N, 2, 2, 2) their covariances.
-        R: (N, 2) variances of the sides as assumed (px²).
+        R: (N, 2, 2) variances of the sides as assumed (px²).
         size: (N, 2) width and height (px).
         unmeasured: (N, 2, 2) sides that measure nothing.
         c: constants.
@@ -256,7 +260,7 @@ def measured_variance(
     cut = cut_probabilities(y, S, size, c)
     # Where a cut explains the innovation, what is left fits and has no heavy tail.
     tail = np.where(cut.sum(axis=2) > 0.5, 1.0, heavy[:, None])
-    variance = (R * tail)[..., None] / np.maximum(1.0 - cut, _LEAST_PROBABILITY)
+    variance = R * tail[..., None] / np.maximum(1.0 - cut, _LEAST_PROBABILITY)
     return np.asarray(np.where(unmeasured, ((_UNMEASURED * size) ** 2)[..., None], variance))
 
 
@@ -329,7 +333,12 @@ def update(
 
 
 def initial_state(
-    boxes: FloatArray, edges: BoolArray, log_variance: float, scene: float, c: ModelConstants
+    boxes: FloatArray,
+    edges: BoolArray,
+    log_variance: float,
+    scene: float,
+    c: ModelConstants,
+    spread: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean (M, 2, 7) and covariance (M, 2, 7, 7) of tracks that begin at boxes.
 
@@ -339,6 +348,7 @@ def initial_state(
         log_variance: ln ρ² of the sensor's sides.
         scene: the same of all sensors, for the errors that last.
         c: constants.
+        spread: (M, 2, 2) what the variance of a side is more where the detector says it (px²), or None.
     """
     size = boxes[:, 2:] - boxes[:, :2]
     R, scale = side_variance(size, log_variance, c), np.sqrt(size.prod(axis=1))[:, None]
@@ -349,6 +359,13 @@ def initial_state(
     covariance[..., VELOCITY, VELOCITY] = (c.velocity_std * scale) ** 2
     covariance[..., ACCELERATION, ACCELERATION] = (c.acceleration_std * scale) ** 2
     covariance[..., LOG_SIZE, LOG_SIZE] = 2.0 * R / size**2
+    if spread is not None:
+        first, last = R + spread[..., 0], R + spread[..., 1]
+        covariance[..., POSITION, POSITION] = (first + last) / 4.0
+        covariance[..., LOG_SIZE, LOG_SIZE] = (first + last) / size**2
+        covariance[..., POSITION, LOG_SIZE] = covariance[..., LOG_SIZE, POSITION] = (last - first) / (
+            2.0 * size
+        )
     covariance[..., GROWTH, GROWTH] = c.growth_std**2
     errors = lasting_error(size, scene, c)
     covariance[..., POSITION_ERROR, POSITION_ERROR], covariance[..., SIZE_ERROR, SIZE_ERROR] = errors

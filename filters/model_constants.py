@@ -39,6 +39,9 @@ class ModelConstants:
             right. Without a floor parked cars, of which a detector repeats the same box, teach that
             boxes are exact.
         pixel_std: part of it that does not shrink with the object (px): boxes in whole pixels.
+        spread_bounds: least and largest standard deviation of a side that a detector's own spread counts for
+            (sizes): beyond, a side is exact, or measures nothing.
+        spread_rate: step of the running mean of their squares, a scan.
         degrees_of_freedom: of Student's t of the sides; heavy tails as measured.
         cut_share: prior probability that one given side is cut by an occluder.
         uncovered_share: prior probability that one given side was cut so far, and now shows further out.
@@ -165,6 +168,8 @@ class ModelConstants:
     side_std: float = 0.09
     side_std_bounds: tuple[float, float] = (0.06, 0.4)
     pixel_std: float = 0.5
+    spread_bounds: tuple[float, float] = (0.01, 1.0)
+    spread_rate: float = 0.05
     degrees_of_freedom: float = 6.0
     cut_share: float = 0.02
     cut_gate: float = 20.0

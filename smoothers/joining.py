@@ -55,12 +55,15 @@ class LearntScene(NamedTuple):
         log_side_variance: (S,) ln ρ² of each sensor's sides.
         log_scene_variance: the same of all, for the errors that last.
         picture: width and height (px).
+        log_own_variance: (S,) ln of the part of it that a detector's own spread stands for; needed where
+            detections have one.
     """
 
     noise: ProcessNoise
     log_side_variance: FloatArray
     log_scene_variance: float
     picture: tuple[float, float]
+    log_own_variance: FloatArray | None = None
 
 
 class MeasuredBoxes(NamedTuple):
@@ -72,6 +75,8 @@ class MeasuredBoxes(NamedTuple):
         boxes: (N, 4) left, top, right, bottom (px).
         edges: (N, 2, 2) by axis and side, which end at the edge of the picture.
         camera: (N, 2) how far the camera's motion had taken what is at rest (px).
+        spread: (N, 2, 2) f² σ² of the sides, where the detector says σ (`filters.box_spread`, px²), else NaN;
+            or None.
     """
 
     t: FloatArray
@@ -79,6 +84,7 @@ class MeasuredBoxes(NamedTuple):
     boxes: FloatArray
     edges: BoolArray
     camera: FloatArray
+    spread: FloatArray | None = None
 
 
 class PieceEnds(NamedTuple):
@@ -275,8 +281,12 @@ def _noise(
     """Return the covariance (N, 2, 2, 2) of centre and ln size by axis, of sides that err independently."""
     both = np.sqrt(size.prod(axis=1))[:, None]
     rho2 = np.exp(scene.log_side_variance[seen.sensor[hit]])[:, None]
-    side = rho2 * (0.5 * both + 0.5 * size) ** 2 + c.pixel_std**2
-    low, high = np.moveaxis(side[..., None] + box_sides.cut_variance(seen.edges[hit], size, c), -1, 0)
+    side = (rho2 * (0.5 * both + 0.5 * size) ** 2 + c.pixel_std**2)[..., None]
+    if seen.spread is not None and scene.log_own_variance is not None:
+        own = np.exp(scene.log_own_variance[seen.sensor[hit]])[:, None] * (0.5 * both + 0.5 * size) ** 2
+        given = seen.spread[hit]
+        side = np.where(np.isnan(given), side, side + given - own[..., None])
+    low, high = np.moveaxis(side + box_sides.cut_variance(seen.edges[hit], size, c), -1, 0)
     R = np.empty((len(hit), 2, 2, 2))
     R[..., 0, 0], R[..., 1, 1] = (low + high) / 4.0, (low + high) / size**2
     R[..., 0, 1] = R[..., 1, 0] = (high - low) / (2.0 * size)

@@ -127,6 +127,9 @@ def _write_lines(scans: Iterable[Scan]) -> None:
             line["embeddings"] = [
                 None if np.isnan(embedding).any() else embedding.tolist() for embedding in embeddings
             ]
+        if scan.box_std is not None and len(scan.boxes):
+            std = np.round(scan.box_std, _PLACES).tolist()
+            line["box_std"] = [[None if side != side else side for side in one] for one in std]
         if scan.camera_motion is not None:
             line["camera_motion"] = scan.camera_motion.tolist()
         sys.stdout.write(json.dumps(line) + "\n")

@@ -121,6 +121,8 @@ inline constexpr double kLongestAgoS = 1000000000.0;
     JEAT_ONE(side_std) \
     JEAT_PAIR(side_std_bounds) \
     JEAT_ONE(pixel_std) \
+    JEAT_PAIR(spread_bounds) \
+    JEAT_ONE(spread_rate) \
     JEAT_ONE(degrees_of_freedom) \
     JEAT_ONE(cut_share) \
     JEAT_ONE(cut_gate) \

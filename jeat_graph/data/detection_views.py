@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, TextArray
+from jeat_graph.data.box_std import STD_COLUMNS, known_std
 from jeat_graph.data.camera_motion import CAMERA_MOTION
 from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR
 from jeat_graph.data.embeddings import EmbeddingArray
@@ -39,6 +40,10 @@ class DetectionViews:
 
         def embedding_rows(self) -> EmbeddingArray | None:
             """What each row of `to_rows` looks like."""
+            ...
+
+        def std_rows(self) -> FloatArray | None:
+            """How sure the detector is of each row's sides."""
             ...
 
         def motion_rows(self) -> FloatArray | None:
@@ -85,6 +90,9 @@ class DetectionViews:
         columns["score"] = scores
         if self.classes is not None:
             columns["class"] = classes
+        spread = known_std(self.std_rows())
+        if spread is not None:
+            columns |= {name: spread[:, k] for k, name in enumerate(STD_COLUMNS)}
         vectors = self.embedding_rows()
         if vectors is not None:
             columns["embedding"] = vectors
@@ -102,10 +110,10 @@ class DetectionViews:
         Args:
             frame: one row a detection, with the columns and other names that files may have: `t` (s, dates or
                 spans of time) or frame numbers; `left, top, width, height`, or `left, top, right, bottom`, or
-                `x1, y1, x2, y2` and so on (px); `score` (1 where there is no such column), `sensor`, `class`
-                and `embedding` (an array of numbers each) where there are such, `camera_motion` too. A row
-                without a box is a scan that found nothing; a box without area is left out, and counted in
-                `dropped`.
+                `x1, y1, x2, y2` and so on (px); `score` (1 where there is no such column), `sensor`, `class`;
+                `left_std, top_std, right_std, bottom_std` (px), `embedding` (an array of numbers each) and
+                `camera_motion` where there are such. A row without a box is a scan that found nothing; a box
+                without area is left out, and counted in `dropped`.
             sensor: name of the sensor where the frame has no such column.
             options: what the frame does not say itself, as `tables.reading.Reading` has it.
 
@@ -123,7 +131,7 @@ class DetectionViews:
             t: time of the picture (s).
             sensor: name of the sensor.
         """
-        boxes, scores, classes, kept, _ = boxes_of(source)
+        boxes, scores, classes, kept, *_ = boxes_of(source)
         if len(boxes):
             out = cls.from_rows(np.full(len(boxes), t), [sensor] * len(boxes), boxes, scores, None, classes)
         else:

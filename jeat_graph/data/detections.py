@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
+from jeat_graph.data.beside import Beside
+from jeat_graph.data.box_std import checked_std, join_std, spread_std
 from jeat_graph.data.boxes import class_texts, find_bad_row
 from jeat_graph.data.camera_motion import bad_motions, join_motions, motions_of_scans, rows_of_motions
 from jeat_graph.data.class_columns import rows_of_class
@@ -37,6 +40,8 @@ class Detections(DetectionViews):
         dropped: boxes without area that a reader has left out; their scans are there.
         embeddings: (N, E) what each looks like, of unit length; NaN where unknown; or None.
         camera_motion: (K, 11) how the camera moved before each scan, NaN where unknown; or None.
+        box_std: (N, 4) standard deviations of left, top, right, bottom by the detector (px), NaN where
+            unknown; or None.
     """
 
     sensors: tuple[str, ...]
@@ -49,6 +54,7 @@ class Detections(DetectionViews):
     dropped: int = 0
     embeddings: EmbeddingArray | None = None
     camera_motion: FloatArray | None = None
+    box_std: FloatArray | None = None
 
     @staticmethod
     def from_rows(
@@ -58,8 +64,7 @@ class Detections(DetectionViews):
         scores: npt.ArrayLike,
         empty: npt.ArrayLike | None = None,
         classes: Sequence[str] | TextArray | None = None,
-        embeddings: npt.ArrayLike | None = None,
-        camera_motion: FloatArray | None = None,
+        **beside: Unpack[Beside],
     ) -> Detections:
         """Group rows, in any order, into scans. Rows of one scan keep their order.
 
@@ -70,9 +75,7 @@ class Detections(DetectionViews):
             scores: (R,) confidence; ignored where `empty`.
             empty: (R,) true where the row only says that the scan took place; none by default.
             classes: (R,) class of each row, optional.
-            embeddings: (R, E) what each row looks like, NaN where that is not known, optional.
-            camera_motion: (R, 11) in one row of each scan that knows it (see `camera_motion`), NaN in the
-                others, optional.
+            beside: `embeddings`, `camera_motion` and `box_std`, each optional, as `Beside` has them.
 
         Raises:
             DataError: a time, a box or an embedding that is not valid; the message names the row.
@@ -96,11 +99,14 @@ class Detections(DetectionViews):
             raise DataError(f"row {np.arange(len(time))[rows][bad[0]]}: {bad[1]}")
         sensors, code = np.unique(names, return_inverse=True)
         kinds = None if classes is None else class_texts(classes, len(time)).copy()
+        embeddings, camera_motion = beside.get("embeddings"), beside.get("camera_motion")
+        box_std = beside.get("box_std")
         vectors = None if embeddings is None else unit_embeddings(embeddings, len(time))
         if camera_motion is not None and bad_motions(camera_motion).any():
             raise DataError(f"row {int(np.argmax(bad_motions(camera_motion)))}: camera_motion is none")
+        spread = None if box_std is None else checked_std(box_std, len(time))
         return Detections.from_checked(
-            time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap, vectors, camera_motion
+            time, sensors.tolist(), code.reshape(-1), (b, s, kinds), gap, vectors, camera_motion, spread
         )
 
     @staticmethod
@@ -112,6 +118,7 @@ class Detections(DetectionViews):
         empty: BoolArray,
         embeddings: EmbeddingArray | None = None,
         camera_motion: FloatArray | None = None,
+        box_std: FloatArray | None = None,
     ) -> Detections:
         """Group rows that are known to be good, as `from_rows`; their arrays may become the detections' own.
 
@@ -123,6 +130,7 @@ class Detections(DetectionViews):
             empty: (R,) true where the row only says that the scan took place.
             embeddings: (R, E) what each row looks like, or None.
             camera_motion: (R, 11) in one row of each scan that knows it, NaN in the others; or None.
+            box_std: (R, 4), or None.
         """
         groups = group_rows(t, code, empty)
         boxes, scores, classes = found
@@ -137,6 +145,7 @@ class Detections(DetectionViews):
             classes=None if classes is None else classes[rows],
             embeddings=None if embeddings is None else embeddings[rows],
             camera_motion=motions_of_scans(camera_motion, groups.scan, len(groups.first)),
+            box_std=None if box_std is None else np.ascontiguousarray(box_std[rows]),
         )
 
     @staticmethod
@@ -150,6 +159,7 @@ class Detections(DetectionViews):
             rows.empty,
             rows.embeddings,
             rows.camera_motion,
+            rows.box_std,
         )
         return replace(found, dropped=rows.dropped)
 
@@ -170,6 +180,7 @@ class Detections(DetectionViews):
             classes=_classes_of_rows(items),
             embeddings=join_embeddings([scan.embeddings for scan in items], rows),
             camera_motion=rows_of_motions([scan.camera_motion for scan in items], np.array(rows)),
+            box_std=join_std([scan.box_std if len(scan) else None for scan in items], rows),
         )
 
     @staticmethod
@@ -185,8 +196,9 @@ class Detections(DetectionViews):
         vectors = [part.embedding_rows() for part in parts]
         whole = Detections.from_rows(
             *(t, sensor, boxes, scores, empty, classes if has_class else None),
-            join_embeddings(vectors, [len(t) for t, *_ in rows]),
-            join_motions([part.motion_rows() for part in parts], [len(t) for t, *_ in rows]),
+            embeddings=join_embeddings(vectors, [len(t) for t, *_ in rows]),
+            camera_motion=join_motions([part.motion_rows() for part in parts], [len(t) for t, *_ in rows]),
+            box_std=join_std([part.std_rows() for part in parts], [len(t) for t, *_ in rows]),
         )
         return replace(whole, dropped=sum(part.dropped for part in parts))
 
@@ -219,6 +231,11 @@ class Detections(DetectionViews):
         count = np.diff(self.scan_start)
         return spread_embeddings(self.embeddings, np.repeat(count > 0, np.maximum(count, 1)))
 
+    def std_rows(self) -> FloatArray | None:
+        """Return `box_std` (R, 4) of the rows of `to_rows`, NaN where unknown; or None."""
+        count = np.diff(self.scan_start)
+        return spread_std(self.box_std, np.repeat(count > 0, np.maximum(count, 1)))
+
     def motion_rows(self) -> FloatArray | None:
         """Return the camera's motions (R, 11) in the first of each scan's rows of `to_rows`; or None."""
         return rows_of_motions(self.camera_motion, np.maximum(np.diff(self.scan_start), 1))
@@ -242,6 +259,7 @@ class Detections(DetectionViews):
             None if self.classes is None else self.classes[rows],
             None if self.embeddings is None else self.embeddings[rows],
             self._motion_of(k),
+            None if self.box_std is None else self.box_std[rows],
         )
 
     def _motion_of(self, k: int) -> FloatArray | None:
@@ -295,6 +313,7 @@ class Detections(DetectionViews):
             scores=self.scores[keep],
             classes=None if self.classes is None else self.classes[keep],
             embeddings=None if self.embeddings is None else self.embeddings[keep],
+            box_std=None if self.box_std is None else self.box_std[keep],
         )
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, TextArray
+from jeat_graph.data.box_std import STD_COLUMNS, known_std
 from jeat_graph.data.box_text import KNOWN, sides_of
 from jeat_graph.data.boxes import class_texts
 from jeat_graph.data.class_columns import CLASS_COLUMNS, declared_classes
@@ -73,16 +74,29 @@ def boxes_of_columns(columns: Mapping[str, Any]) -> FloatArray:
     return sides_to_boxes(names, np.column_stack([numbers_of(columns[name], name) for name in names]))
 
 
-def detector_columns(table: Any) -> tuple[FloatArray, FloatArray | None, Any]:
-    """Return boxes (M, 4), scores (M,) or None, and names of classes (M,) or None, of one picture's table.
+class DetectorColumns(NamedTuple):
+    """One picture's table: boxes (M, 4); and scores (M,), classes (M,), `box_std` (M, 4) as far as there."""
+
+    boxes: FloatArray
+    scores: FloatArray | None
+    classes: TextArray | None
+    box_std: FloatArray | None
+
+
+def detector_columns(table: Any) -> DetectorColumns:
+    """Return what one picture's table says.
 
     Raises:
         DataError: as `named_columns` and `boxes_of_columns`.
     """
-    columns = named_columns(table, BOX, ("score", *CLASS_COLUMNS), "boxes")
+    columns = named_columns(table, BOX, ("score", *CLASS_COLUMNS, *STD_COLUMNS), "boxes")
     boxes = boxes_of_columns(columns)
     scores = numbers_of(columns["score"], "score") if "score" in columns else None
-    return boxes, scores, classes_of_columns(columns, len(boxes))
+    std = np.full((len(boxes), 4), np.nan)
+    for side, name in enumerate(STD_COLUMNS):
+        if name in columns:
+            std[:, side] = numbers_of(columns[name], name)
+    return DetectorColumns(boxes, scores, classes_of_columns(columns, len(boxes)), known_std(std))
 
 
 def classes_of_columns(columns: Mapping[str, Any], count: int) -> TextArray | None:

@@ -31,6 +31,7 @@ class Boxes(NamedTuple):
         classes: (M,) class names, or None where the detector says none.
         kept: (R,) which of the rows these are; the others have no area.
         class_ids: number of each class by its name, where the detector numbers them.
+        box_std: (M, 4) standard deviations of left, top, right, bottom (px), or None.
     """
 
     boxes: FloatArray
@@ -38,6 +39,7 @@ class Boxes(NamedTuple):
     classes: TextArray | None
     kept: BoolArray
     class_ids: Mapping[str, int] = MappingProxyType({})
+    box_std: FloatArray | None = None
 
 
 class _Found(NamedTuple):
@@ -47,6 +49,7 @@ class _Found(NamedTuple):
     scores: FloatArray | None = None
     classes: TextArray | None = None
     class_ids: Mapping[str, int] = MappingProxyType({})
+    box_std: FloatArray | None = None
 
 
 def boxes_of(
@@ -60,9 +63,9 @@ def boxes_of(
     Args:
         source: `supervision.Detections`; a result of `ultralytics` (one picture, or a list of one), with
             oriented boxes too; a dict with `boxes`, `scores` and `labels`, as `torchvision` and
-            `transformers` give it; a data frame, whose columns are found by name as in files, `score` and
-            `class` too; an array (M, 4) of boxes in px, (M, 5) with the score behind, or (M, 6) with the
-            number of the class behind that; or None: nothing was found.
+            `transformers` give it; a data frame, whose columns are found by name as in files, `score`,
+            `class` and `left_std` too; an array (M, 4) of boxes in px, (M, 5) with the score behind, or
+            (M, 6) with the number of the class behind that; or None: nothing was found.
         scores: (M,) confidence in [0, 1], in place of the source's own; 1 where neither says it.
         classes: (M,) names or numbers of classes, in place of the source's own.
         form: what boxes of an array or a dict are, of `FORMATS`: left, top, width, height; left, top, right,
@@ -80,7 +83,9 @@ def boxes_of(
     if classes is not None:
         names, ids = _named(detached(classes), count)
     confidence = np.ones(count) if confidence is None else np.asarray(confidence, dtype=np.float64)
-    return _with_area(found.boxes, confidence, names)._replace(class_ids=ids)
+    out = _with_area(found.boxes, confidence, names)
+    std = None if found.box_std is None else found.box_std[out.kept]
+    return out._replace(class_ids=ids, box_std=std)
 
 
 def _found_in(source: Any, form: str | None) -> _Found:
@@ -100,7 +105,8 @@ def _found_in(source: Any, form: str | None) -> _Found:
     if own:
         return _from_ultralytics(source)
     if has_columns(source):
-        return _Found(*detector_columns(source))
+        columns = detector_columns(source)
+        return _Found(columns.boxes, columns.scores, columns.classes, box_std=columns.box_std)
     return _from_array(source, form)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray, TextArray
+from jeat_graph.data.box_std import checked_std
 from jeat_graph.data.boxes import check_boxes, class_texts, without_area
 from jeat_graph.data.camera_motion import motion_of
 from jeat_graph.data.embeddings import EmbeddingArray, unit_embeddings
@@ -36,9 +37,12 @@ class Scan:
         classes: (M,) class names, empty text where unknown, or None.
         embeddings: (M, E) what each looks like, of unit length (float32); NaN where unknown; or None.
         camera_motion: (11,) how the camera moved since its picture before (see `camera_motion`), or None.
+        box_std: (M, 4) standard deviations of left, top, right, bottom by the detector (px), NaN where
+            unknown; or None.
 
     Raises:
-        DataError: if any value is not valid (see `check_boxes`, `unit_embeddings`, `motion_of`).
+        DataError: if any value is not valid (see `check_boxes`, `unit_embeddings`, `motion_of`,
+            `checked_std`).
     """
 
     t: float
@@ -48,6 +52,7 @@ class Scan:
     classes: TextArray | None = None
     embeddings: EmbeddingArray | None = None
     camera_motion: FloatArray | None = None
+    box_std: FloatArray | None = None
 
     def __post_init__(self) -> None:
         t = time_of(self.t)
@@ -63,6 +68,8 @@ class Scan:
             object.__setattr__(self, "embeddings", unit_embeddings(self.embeddings, len(scores)))
         if self.camera_motion is not None:
             object.__setattr__(self, "camera_motion", motion_of(self.camera_motion))
+        if self.box_std is not None:
+            object.__setattr__(self, "box_std", checked_std(self.box_std, len(scores)))
 
     def __len__(self) -> int:
         return len(self.scores)
@@ -107,6 +114,7 @@ def scan_with_area(
     classes: npt.ArrayLike | None = None,
     embeddings: npt.ArrayLike | None = None,
     camera_motion: npt.ArrayLike | None = None,
+    box_std: npt.ArrayLike | None = None,
 ) -> tuple[Scan, int]:
     """Make a scan of what a detector gave, which may have clipped boxes to nothing.
 
@@ -118,6 +126,7 @@ def scan_with_area(
         classes: (M,) class names, or None.
         embeddings: (M, E), or None.
         camera_motion: (11,), or None.
+        box_std: (M, 4), or None.
 
     Returns:
         The scan without the boxes that have no area, and how many these were.
@@ -125,7 +134,7 @@ def scan_with_area(
     Raises:
         DataError: as `Scan` does.
     """
-    columns: list[Any] = [boxes, scores, classes, embeddings]
+    columns: list[Any] = [boxes, scores, classes, embeddings, box_std]
     flat = None
     with contextlib.suppress(TypeError, ValueError, OverflowError):  # what is no array is named by `Scan`
         table = np.asarray(boxes, dtype=np.float64)
@@ -136,7 +145,7 @@ def scan_with_area(
         if flat is not None and flat.any() and all(one is None or len(one) == len(flat) for one in columns):
             columns = [None if one is None else np.asarray(one)[~flat] for one in columns]
     motion = None if camera_motion is None else motion_of(camera_motion)
-    made = Scan(t, sensor, columns[0], columns[1], columns[2], columns[3], motion)
+    made = Scan(t, sensor, columns[0], columns[1], columns[2], columns[3], motion, columns[4])
     return made, 0 if flat is None else int(flat.sum())
 
 
@@ -148,11 +157,13 @@ def trusted_scan(
     classes: TextArray | None,
     embeddings: EmbeddingArray | None,
     camera_motion: FloatArray | None,
+    box_std: FloatArray | None,
 ) -> Scan:
     """Make a scan of arrays that were checked already, without checking them again."""
     scan = object.__new__(Scan)
     values: dict[str, Any] = {"t": t, "sensor": sensor, "boxes": boxes, "scores": scores}
     values |= {"classes": classes, "embeddings": embeddings, "camera_motion": camera_motion}
+    values["box_std"] = box_std
     for name, value in values.items():
         object.__setattr__(scan, name, value)
     return scan

@@ -78,9 +78,9 @@ class MaskedPicture:
             return scan
         classes = None if scan.classes is None else scan.classes[keep]
         vectors = None if scan.embeddings is None else scan.embeddings[keep]
-        return replace(
-            scan, boxes=scan.boxes[keep], scores=scan.scores[keep], classes=classes, embeddings=vectors
-        )
+        std = None if scan.box_std is None else scan.box_std[keep]
+        boxes, scores = scan.boxes[keep], scan.scores[keep]
+        return replace(scan, boxes=boxes, scores=scores, classes=classes, embeddings=vectors, box_std=std)
 
     def keep(self, boxes: FloatArray) -> BoolArray:
         """Return which boxes (M, 4: left, top, width, height, px) do not lie mostly in a mask."""

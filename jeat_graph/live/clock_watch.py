@@ -220,7 +220,7 @@ class ClockWatch:
             return 0
         one.odd = 0
         step_s = t - one.newest if one.scans else 0.0
-        one.scans.append(trusted_scan(t, scan.sensor, scan.boxes, scan.scores, None, None, None))
+        one.scans.append(trusted_scan(t, scan.sensor, scan.boxes, scan.scores, None, None, None, None))
         while one.scans[0].t < t - WINDOW_S:
             one.scans.popleft()
         return math.ceil(_STEPS_A_SECOND * step_s)

@@ -12,6 +12,7 @@ from jeat_graph.config.schema import Config
 from jeat_graph.config.section_tree import build, plain
 from jeat_graph.config.sensors import ClockConfig, SensorConfig
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.box_std import scaled_std
 from jeat_graph.data.camera_motion import scaled_motion
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, DataError
@@ -95,6 +96,7 @@ class CommonPicture:
             None if scan.classes is None else scan.classes[seen],
             None if scan.embeddings is None else scan.embeddings[seen],
             None if scan.camera_motion is None else _motion_in(way.picture, scan.camera_motion),
+            None if scan.box_std is None else scaled_std(scan.box_std, scan.boxes, boxes)[seen],
         )
 
     def detections(self, detections: Detections) -> Detections:
@@ -112,8 +114,11 @@ class CommonPicture:
             if way.picture is not None:
                 rows = np.flatnonzero(of_row == code)
                 boxes[rows], seen[rows] = way.picture.boxes(boxes[rows])
+        std = detections.box_std
+        std = None if std is None else scaled_std(std, detections.boxes, boxes)
         self.lost += int((~seen).sum())
-        moved = replace(detections, boxes=boxes, camera_motion=self._motions(detections)).where(seen)
+        motions = self._motions(detections)
+        moved = replace(detections, boxes=boxes, camera_motion=motions, box_std=std).where(seen)
         return moved if np.array_equal(t, detections.scan_t) else at_times(moved, t)
 
     def _motions(self, detections: Detections) -> FloatArray | None:

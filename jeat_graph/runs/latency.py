@@ -38,5 +38,9 @@ def taken_off(detections: Detections, late_s: Mapping[str, float]) -> Detections
     of_row = dict(zip(detections.sensors, latency.tolist(), strict=True))
     earlier = t - np.array([of_row[name] for name in sensor.tolist()])
     named = None if detections.classes is None else classes
-    beside = detections.embedding_rows(), detections.motion_rows()
-    return Detections.from_rows(earlier, sensor, boxes, scores, empty, named, *beside)
+    return Detections.from_rows(
+        *(earlier, sensor, boxes, scores, empty, named),
+        embeddings=detections.embedding_rows(),
+        camera_motion=detections.motion_rows(),
+        box_std=detections.std_rows(),
+    )

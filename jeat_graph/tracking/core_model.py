@@ -56,9 +56,9 @@ class CoreModel(OneModel):
         similarity = None if inputs.similarity is None else np.ascontiguousarray(inputs.similarity)
         owners = None if inputs.owners is None else np.ascontiguousarray(inputs.owners)
         boxes, logits = np.ascontiguousarray(inputs.boxes), logit(inputs.scores)
-        self._model.take(
-            inputs.t, inputs.sensors, inputs.numbers, boxes, logits, similarity, inputs.motion, owners
-        )
+        box_std = None if inputs.box_std is None else np.ascontiguousarray(inputs.box_std)
+        found = inputs.sensors, inputs.numbers, boxes, logits
+        self._model.take(inputs.t, *found, similarity, inputs.motion, owners, box_std)
 
     def reset(self, t: float) -> None:
         """End all tracks and go on from another time (s)."""
@@ -155,6 +155,8 @@ class CoreModel(OneModel):
                 score_weight=column["score_weight"],
                 noise_share=float(column["noise_share"]),
             ),
+            log_own_variance=column["log_own_variance"],
+            spread_gain=column["spread_gain"],
             log_side_variance=column["log_side_variance"],
             lasting_error=np.sqrt(column["lasting"]),
             log_scene_variance=float(column["log_scene_variance"]),

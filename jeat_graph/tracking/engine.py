@@ -40,6 +40,8 @@ class StepInput(NamedTuple):
             of a sensor each; 1 where more of its owner's are to come; posterior of an object there by what
             comes later, for the smoother, below 0 where it is not known. A track of an owner takes no box
             but its own, and lives as long as it is awaited. None where the engine decides.
+        box_std: (M, 4) standard deviations of left, top, right, bottom by the detector (px), NaN where
+            unknown; None where all are.
     """
 
     t: float
@@ -50,6 +52,7 @@ class StepInput(NamedTuple):
     similarity: FloatArray | None = None
     motion: FloatArray | None = None
     owners: FloatArray | None = None
+    box_std: FloatArray | None = None
 
 
 class StepBoxes(NamedTuple):

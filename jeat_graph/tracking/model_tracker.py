@@ -251,7 +251,7 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
         compared = None if embeddings is None else self._compare(embeddings, sensors_of(batch, codes))
         similarity = None if compared is None else compared.log_ratio[:, found.order]
         given = None if owners is None else owners[found.order]
-        self._model.take(StepInput(t, *found[:4], similarity, surest_motion(batch), given))
+        self._model.take(StepInput(t, *found[:4], similarity, surest_motion(batch), given, found.box_std))
         self._order, self._given, self._causal = found.order, count, None
         if self._log is not None:
             self._log.add(batch, took(self, count), camera_moved(self), kept)

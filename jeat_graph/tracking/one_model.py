@@ -33,6 +33,9 @@ class Learnt(NamedTuple):
     Attributes:
         belief: of the sensors.
         log_side_variance: (S,) ln of the variances of their boxes' sides, as the filter takes them.
+        log_own_variance: (S,) ln ρ², without what lasts,
+        spread_gain: (S,) and f² of the spreads that they give with their boxes (`box_spread`); 1
+            without any.
         lasting_error: (S,) standard deviation of what of their errors lasts (sizes).
         log_scene_variance: the same of the scene; 0 before the first scan.
         leftovers: (S,) mean number of boxes in a scan that no track takes,
@@ -45,6 +48,8 @@ class Learnt(NamedTuple):
 
     belief: SensorBelief
     log_side_variance: FloatArray
+    log_own_variance: FloatArray
+    spread_gain: FloatArray
     lasting_error: FloatArray
     log_scene_variance: float
     leftovers: FloatArray
@@ -140,6 +145,7 @@ class OneModel(SmoothsRecords):
                 stationary_unseen=float(belief.stationary_unseen[k]),
                 noise_scale=float(noise[k]),
                 lasting_error=float(learnt.lasting_error[k]),
+                spread_factor=float(np.sqrt(learnt.spread_gain[k])),
                 offset_centre_share=(offsets[k][0], offsets[k][1]),
                 offset_log_size=(offsets[k][2], offsets[k][3]),
             )

@@ -22,6 +22,7 @@ from jeat_graph.association.assignment import assign
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import (
     box_sides,
+    box_spread,
     camera_motion,
     evidence,
     gap_survival,
@@ -90,7 +91,7 @@ class Reported(NamedTuple):
         assigned: per scan (M,) identity of the track that took each box; every box has one.
         records: per scan, for the smoother.
         nis: per scan (M,) of `AssociatedPairs`, NaN where a box began a track.
-        noise_scale: per scan, variance of the sensor's sides as it was, 1 before anything was learnt.
+        noise_scale: per scan (M,), mean variance of each box's sides, 1 before anything was learnt.
         gaps: counted before any track ends.
     """
 
@@ -99,7 +100,7 @@ class Reported(NamedTuple):
     assigned: list[IntArray]
     records: list[FilterRecord]
     nis: list[FloatArray]
-    noise_scale: list[float]
+    noise_scale: list[FloatArray]
     gaps: GapCounts
 
 
@@ -122,7 +123,7 @@ def step(
     step_s = t if state.t is None else state.t
     state.tracks = replace(state.tracks, used=np.zeros_like(state.tracks.used))
     assigned, records = [np.zeros(0, dtype=np.int64) for _ in scans], []
-    nis, noise_scale = [np.full(len(scan.boxes), np.nan) for scan in scans], [1.0 for _ in scans]
+    nis, noise_scale = [np.full(len(scan.boxes), np.nan) for scan in scans], [np.zeros(0) for _ in scans]
     for place in order_of_scans(state, scans, c):
         given = scans[place]
         clock = begin_scan(state, t, given, c)
@@ -131,7 +132,7 @@ def step(
         scan = correct_boxes(state, given, c)
         follow_picture(state, scan, motion, step_s, c)
         follow_camera(state, scan, dt, c)
-        noise_scale[place] = math.exp(state.log_noise(c)[given.sensor]) / c.side_std**2
+        noise_scale[place] = state.noise_of(given, c) / c.side_std**2
         pairs = associate(state, scan, c)
         nis[place][pairs.box] = pairs.nis
         count_gaps(state, scan, pairs, c)
@@ -275,8 +276,10 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     tracks, k = state.tracks, scan.sensor
     p_detect = own_p_detect(tracks, state.sensors.p_detect, c)[:, k]
     noise = float(state.log_noise(c)[k])
-    innovation = box_sides.innovations(tracks.mean, tracks.covariance, scan.boxes, scan.edges, noise, c)
     size = singer.expected_size(tracks.mean)
+    spread = state.spread_of(scan, size[:, None])
+    seen = scan.boxes, scan.edges
+    innovation = box_sides.innovations(tracks.mean, tracks.covariance, *seen, noise, c, spread)
     density = likelihood_ratio.sides_log_density(innovation, size, c)
     threshold = float(state.sensors.decision_threshold[k])
     score = likelihood_ratio.score_log_ratio(tracks.real, scan.logits - threshold, c)
@@ -285,8 +288,8 @@ def associate(state: ReferenceState, scan: SensorScan, c: ModelConstants) -> Ass
     ratio = likelihood_ratio.pair_log_ratio(density, present, score, clutter)
     ratio = by_owner(ratio, tracks.given, scan.owners)
     track, box = assign(by_appearance(ratio, scan.similarity), c.exact_assignment)
-    seen = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track, box]
-    nis = (seen[0].mean(axis=2) ** 2 / seen[1].mean(axis=(2, 3))).sum(axis=1)
+    y, S = innovation.y[track, box].reshape(-1, 2, 2), innovation.S[track, box]
+    nis = (y.mean(axis=2) ** 2 / S.mean(axis=(2, 3))).sum(axis=1)
     by_itself = score_calibration.box_probability(scan.boxes, scan.logits, threshold)
     confirms = by_itself[box] >= c.confirming
     return AssociatedPairs(track, box, ratio[track, box], p_detect, confirms, innovation, nis)
@@ -339,8 +342,14 @@ def learn_noise(
     if sure.any():
         share = noise_learning.share_of_scan(int(sure.sum()), clock.period_s, c)
         k, known = scan.sensor, i[sure]
-        log_variance = float(state.log_side_variance[k])
+        log_variance, square = float(state.log_side_variance[k]), float(state.mean_spread[k])
+        if scan.spread is not None:
+            found = scan.boxes[pairs.box[sure]]
+            ratio = box_spread.scale(found[:, 2:] - found[:, :2]) / box_spread.scale(size[sure])
+            given = scan.spread[pairs.box[sure]] * (ratio**2)[..., None]
+            log_variance, square = box_spread.learn_mean_square(log_variance, square, given, share, c)
         state.log_side_variance[k] = noise_learning.learn_measurement_noise(log_variance, e[sure], share, c)
+        state.mean_spread[k] = square
         before = tracks.innovation[known], tracks.has_innovation[known]
         state.process_noise = noise_learning.learn_process_noise(
             state.process_noise, e[sure], *before, share, c
@@ -359,7 +368,7 @@ def update(state: ReferenceState, pairs: AssociatedPairs, c: ModelConstants) -> 
     tracks, i, seen = state.tracks, pairs.track, pairs.innovation
     y, S, unmeasured = seen.y[i, pairs.box], seen.S[i, pairs.box], seen.unmeasured[i, pairs.box]
     R = box_sides.measured_variance(
-        y, S, seen.side_variance[i], singer.expected_size(tracks.mean[i]), unmeasured, c
+        y, S, seen.side_variance[i, pairs.box], singer.expected_size(tracks.mean[i]), unmeasured, c
     )
     mean, covariance = tracks.mean.copy(), tracks.covariance.copy()
     m, P, y = box_sides.uncover(mean[i], covariance[i], y, S, unmeasured, c)

@@ -38,7 +38,9 @@ def begin_tracks(
     evidence = Evidence.of_births(clock.t, scan.sensor, state.num_sensors, logits, overlap, clock.weight)
     noise = float(state.log_noise(c)[scan.sensor]), state.log_scene_variance(c)
     ids = np.arange(state.next_id, state.next_id + len(free), dtype=np.int64)
-    mean, covariance = box_sides.initial_state(boxes, scan.edges[free], *noise, c)
+    spread = state.spread_of(scan, scan.boxes[:, 2:] - scan.boxes[:, :2])
+    own = None if spread is None else spread[free]
+    mean, covariance = box_sides.initial_state(boxes, scan.edges[free], *noise, c, own)
     mean = with_velocity(mean, state.camera_velocity)
     new = ReferenceTracks.begun(ids, mean, covariance, evidence)
     if scan.owners is not None and scan.awaited is not None:

@@ -11,7 +11,7 @@ import numpy as np
 from jeat_graph.config.schema import Config
 from jeat_graph.config.sensors import SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.filters import sensor_offsets
+from jeat_graph.filters import box_spread, sensor_offsets
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.object_probability import SensorBelief
 from jeat_graph.filters.picture_motion import PictureMotion
@@ -78,6 +78,9 @@ class ReferenceModel(OneModel):
         t, similarity, motion, owners = inputs.t, inputs.similarity, inputs.motion, inputs.owners
         sides = np.concatenate([inputs.boxes[:, :2], inputs.boxes[:, :2] + inputs.boxes[:, 2:]], axis=1)
         logits, ends = logit(inputs.scores), np.cumsum(inputs.numbers)
+        spread = None
+        if inputs.box_std is not None:
+            spread = box_spread.squares(inputs.box_std, inputs.boxes[:, 2:], self.constants)
         is_reset = self._state.t is not None and t - self._state.t >= LONGEST_SILENCE_S
         if is_reset:
             reset(self._state, t, self.constants)
@@ -90,13 +93,13 @@ class ReferenceModel(OneModel):
                 None if similarity is None else similarity[:, end - n : end],
                 owners=None if owners is None else owners[end - n : end, 0].astype(np.int64),
                 awaited=None if owners is None else owners[end - n : end, 1] > 0,
+                spread=None if spread is None else spread[end - n : end],
             )
             for k, n, end in zip(inputs.sensors, inputs.numbers, ends, strict=True)
         ]
         moved = None if motion is None else PictureMotion.of_numbers(motion)
         done = step(self._state, t, scans, self.constants, moved)
         reported, tracks = done.tracks.take(done.reported), done.tracks
-        scale = [np.full(len(one), value) for one, value in zip(done.nis, done.noise_scale, strict=True)]
         nothing = np.zeros(0)
         called = [Called(track) for track in reported.track_id.tolist()]
         states, when = (reported.mean, reported.covariance), np.full(len(called), t)
@@ -105,7 +108,7 @@ class ReferenceModel(OneModel):
             (reported.mean.reshape(-1, 2 * STATES), reported.covariance.reshape(-1, 2 * STATES**2)),
             np.concatenate([*done.assigned, np.zeros(0, np.int64)]),
             tracks.track_id,
-            (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *scale]), tracks.real),
+            (np.concatenate([nothing, *done.nis]), np.concatenate([nothing, *done.noise_scale]), tracks.real),
         )
         kept = np.isin(tracks.track_id, self._state.tracks.track_id)
         confirmed = tracks.evidence.confirmed_s == t
@@ -210,6 +213,8 @@ class ReferenceModel(OneModel):
         return Learnt(
             SensorBelief(*state.sensors),
             state.log_noise(self.constants),
+            state.log_side_variance,
+            state.spread_gains(),
             np.sqrt(state.accuracy.lasting),
             state.log_scene_variance(self.constants) if state.t is not None else 0.0,
             state.leftovers,

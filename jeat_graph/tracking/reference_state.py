@@ -10,6 +10,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import (
+    box_spread,
     camera_motion,
     gap_survival,
     object_probability,
@@ -139,6 +140,8 @@ class SensorScan(NamedTuple):
         owners: (M,) whose each box is, -1 for nobody's, at most one of each owner; None where the tracker
             decides.
         awaited: (M,) whether more boxes of its owner are to come; given with `owners`.
+        spread: (M, 2, 2) by axis and side (σ/s)² as the detector says it (`box_spread`), NaN where unknown;
+            or None.
     """
 
     sensor: int
@@ -148,6 +151,7 @@ class SensorScan(NamedTuple):
     edges: BoolArray = np.zeros((0, 2, 2), dtype=np.bool_)
     owners: IntArray | None = None
     awaited: BoolArray | None = None
+    spread: FloatArray | None = None
 
 
 @dataclass
@@ -171,6 +175,7 @@ class ReferenceState:
         offsets: what two sensors' boxes differ by. `compare_sensors`
         accuracy: what lasts of the sensors' errors. `compare_sensors`, `learn`
         log_side_variance: (S,) ln ρ² of the sensors' sides. `learn_noise`
+        mean_spread: (S,) mean of (σ/s)² of their boxes, NaN where none is known. `learn_noise`
         leftovers: (S,) running mean of boxes a scan that no track takes. `count_clutter`
         false_boxes: (S,) the same of boxes that are of nothing real. `count_false_boxes`
         period_s: (S,) running mean of the time between two scans (s); NaN before the second. `begin_scan`
@@ -200,6 +205,7 @@ class ReferenceState:
     offsets: OffsetSums
     accuracy: AccuracySums
     log_side_variance: FloatArray
+    mean_spread: FloatArray
     leftovers: FloatArray
     false_boxes: FloatArray
     period_s: FloatArray
@@ -220,6 +226,32 @@ class ReferenceState:
         """Return ln of the variances (S,) of the sensors' sides, as the filter takes them."""
         compared = self.offsets.weight.sum(axis=1)
         return sensor_accuracy.log_noise(self.log_side_variance, compared, self.accuracy.lasting, c)
+
+    def spread_gains(self) -> FloatArray:
+        """Return f² (S,), by which the sensors' own variances of sides are taken."""
+        pairs = zip(self.log_side_variance.tolist(), self.mean_spread.tolist(), strict=True)
+        return np.array([box_spread.gain(*pair) for pair in pairs])
+
+    def noise_of(self, scan: SensorScan, c: ModelConstants) -> FloatArray:
+        """Return the mean variance (M,) of each box's sides, in sizes²."""
+        k, noise = scan.sensor, math.exp(self.log_noise(c)[scan.sensor])
+        if scan.spread is None:
+            return np.full(len(scan.boxes), noise)
+        own = float(self.log_side_variance[k]), float(self.spread_gains()[k])
+        return box_spread.mean_noise(noise, scan.spread, *own)
+
+    def spread_of(self, scan: SensorScan, size: FloatArray) -> FloatArray | None:
+        """Return what the variances of a scan's sides are more by its own spreads (..., M, 2, 2), in px².
+
+        Args:
+            scan: of M boxes.
+            size: (..., M or 1, 2) width and height of the objects (px).
+        """
+        if scan.spread is None:
+            return None
+        k, own = scan.sensor, scan.boxes[:, 2:] - scan.boxes[:, :2]
+        noise = float(self.log_side_variance[k]), float(self.spread_gains()[k])
+        return box_spread.more_variance(scan.spread, own, size, *noise)
 
     def log_scene_variance(self, c: ModelConstants) -> float:
         """Return the mean of these over sensors that have had a scan: the scale of lasting errors."""
@@ -251,6 +283,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         offsets=sensor_offsets.no_offsets(),
         accuracy=sensor_accuracy.no_accuracy(),
         log_side_variance=none,
+        mean_spread=none,
         leftovers=none,
         false_boxes=none,
         period_s=none,
@@ -278,6 +311,7 @@ def declare_sensor(
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
     state.offsets = sensor_offsets.widened(state.offsets)
     state.log_side_variance = np.append(state.log_side_variance, 2.0 * math.log(c.side_std))
+    state.mean_spread = np.append(state.mean_spread, np.nan)
     state.leftovers = np.append(state.leftovers, c.first_leftovers)
     state.false_boxes = np.append(state.false_boxes, c.first_leftovers)
     state.period_s = np.append(state.period_s, np.nan)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.box_std import join_std, known_std
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError, TimeOrderError, UnknownSensorError
 
@@ -46,6 +47,7 @@ class Gathered(NamedTuple):
         numbers: (K,) of boxes of each.
         boxes: (M, 4) left, top, width, height (px); perhaps the scan's own, not to be written to.
         scores: (M,) of them; the same.
+        box_std: (M, 4) standard deviations of their sides (px), NaN where unknown; None where all are.
         order: (M,) which of the boxes given, one scan after the other, each is.
     """
 
@@ -53,6 +55,7 @@ class Gathered(NamedTuple):
     numbers: IntArray
     boxes: FloatArray
     scores: FloatArray
+    box_std: FloatArray | None
     order: IntArray
 
 
@@ -68,7 +71,8 @@ def gather(batch: Sequence[Scan], codes: Sequence[int], kept: BoolArray | None) 
         (scan,) = batch
         count = len(scan)
         places = np.arange(count, dtype=np.int64)
-        return Gathered(np.array(codes), np.array([count]), scan.boxes, scan.scores, places)
+        found = scan.boxes, scan.scores, known_std(scan.box_std)
+        return Gathered(np.array(codes), np.array([count]), *found, places)
     sensor = sensors_of(batch, codes)
     order = np.argsort(sensor, kind="stable")
     order = order if kept is None else order[kept[order]]
@@ -76,7 +80,8 @@ def gather(batch: Sequence[Scan], codes: Sequence[int], kept: BoolArray | None) 
     boxes = np.concatenate([scan.boxes for scan in batch])[order]
     scores = np.concatenate([scan.scores for scan in batch])[order]
     numbers = np.bincount(sensor[order], minlength=max(codes) + 1)[scanning].astype(np.int64)
-    return Gathered(scanning, numbers, boxes, scores, order)
+    std = join_std([scan.box_std for scan in batch], [len(scan) for scan in batch])
+    return Gathered(scanning, numbers, boxes, scores, None if std is None else std[order], order)
 
 
 def sensors_of(batch: Sequence[Scan], codes: Sequence[int]) -> IntArray:

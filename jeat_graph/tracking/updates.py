@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import IntArray
+from jeat_graph.data.box_std import checked_std
 from jeat_graph.data.embeddings import unit_embeddings
 from jeat_graph.data.interop import boxes_of, is_supervision
 from jeat_graph.data.scan import Scan
@@ -42,6 +43,7 @@ class Updates:
         scores: npt.ArrayLike | None = None,
         classes: npt.ArrayLike | None = None,
         embeddings: npt.ArrayLike | None = None,
+        box_std: npt.ArrayLike | None = None,
         format: Literal["ltwh", "xyxy", "xywh"] | None = None,  # what users of other libraries call it
     ) -> Trajectories:
         """Take in what a detector returned for one picture.
@@ -57,6 +59,8 @@ class Updates:
             scores: (M,) confidence in [0, 1], for boxes that come without; 1 where neither says it.
             classes: (M,) names or numbers of classes, for boxes that come without.
             embeddings: (M, E) what each looks like, of a network for re-identification; NaN where unknown.
+            box_std: (M, 4) standard deviations of left, top, right, bottom by the detector (px); NaN where
+                unknown. A data frame may have them in its columns.
             format: what boxes of an array are: `ltwh` (left, top, width, height; so they are taken without
                 it), `xyxy` (left, top, right, bottom), or `xywh` (centre, width, height).
 
@@ -64,9 +68,10 @@ class Updates:
         """
         found = boxes_of(source, scores, classes, format)
         vectors = None if embeddings is None else unit_embeddings(embeddings, len(found.kept))[found.kept]
+        std = found.box_std if box_std is None else checked_std(box_std, len(found.kept))[found.kept]
         own = is_supervision(source)
         self.logs_assigned = self.logs_assigned or own
-        scan = Scan(t, sensor, found.boxes, found.scores, found.classes, vectors)
+        scan = Scan(t, sensor, found.boxes, found.scores, found.classes, vectors, None, std)
         self._class_ids = {**self._class_ids, **found.class_ids}
         table = self.step(scan)
         if not own:

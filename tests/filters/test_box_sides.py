@@ -29,7 +29,7 @@ def tracked(box=BOX, seconds=0.04, times=30):
         F = singer.in_perspective(step.F, mean, seconds, C)
         mean, covariance = singer.predict(mean, covariance, step, F, q, LOG_VARIANCE, C)
         seen = box_sides.innovations(mean, covariance, box, WHOLE, LOG_VARIANCE, C)
-        R = np.repeat(seen.side_variance[..., None], 2, axis=2)
+        R = seen.side_variance[:, 0]
         mean, covariance = box_sides.update(mean, covariance, seen.y[:, 0], seen.H, R)
     F = singer.in_perspective(step.F, mean, seconds, C)
     return singer.predict(mean, covariance, step, F, q, LOG_VARIANCE, C)
@@ -105,7 +105,7 @@ def test_a_cut_side_is_told_and_hardly_measures(side, left_over):
     cut = box_sides.cut_probabilities(y, S, size, C)
     assert cut[0, axis, end] > 0.99
     assert np.delete(cut.ravel(), 2 * axis + end).max() < 0.05
-    R = box_sides.measured_variance(y, S, seen.side_variance, size, WHOLE, C)
+    R = box_sides.measured_variance(y, S, seen.side_variance[:, 0], size, WHOLE, C)
     after, _ = box_sides.update(mean, covariance, y, seen.H, R)
     np.testing.assert_allclose(box_sides.corners(after), BOX, atol=0.06 * extent)
 
@@ -126,7 +126,7 @@ def test_a_side_that_shows_again_is_taken_as_it_is_measured():
     np.testing.assert_allclose(grown[0, 0] - covariance[0, 0], y[0, 0, 1] ** 2 * np.outer(along, along))
     np.testing.assert_array_equal(grown[0, 1], covariance[0, 1])
     assert rest[0, 0].tolist() == [y[0, 0, 0], 0.0]
-    R = box_sides.measured_variance(y, S, seen.side_variance, size, WHOLE, C)
+    R = box_sides.measured_variance(y, S, seen.side_variance[:, 0], size, WHOLE, C)
     after, _ = box_sides.update(got, grown, rest, box_sides.measurement_matrix(singer.expected_size(got)), R)
     np.testing.assert_allclose(box_sides.expected_corners(after), BOX, atol=2.0)
 
@@ -177,7 +177,7 @@ def test_a_box_that_leaves_keeps_its_size_and_its_other_sides_measure(shown):
     seen = box_sides.innovations(mean, covariance, cut, edges, LOG_VARIANCE, C)
     assert seen.unmeasured[0, 0].tolist() == [[True, False], [False, False]]
     y, S, unmeasured, size = seen.y[:, 0], seen.S[:, 0], seen.unmeasured[:, 0], singer.expected_size(mean)
-    R = box_sides.measured_variance(y, S, seen.side_variance, size, unmeasured, C)
+    R = box_sides.measured_variance(y, S, seen.side_variance[:, 0], size, unmeasured, C)
     m, P, rest = box_sides.uncover(mean, covariance, y, S, unmeasured, C)
     after, _ = box_sides.update(m, P, rest, seen.H, R)
     want = [100.0 * (shown - 1.0), 300.0, 100.0 * shown, 360.0]
@@ -191,7 +191,7 @@ def test_a_side_that_measures_nothing_is_no_measurement():
     edges = np.array([[[True, False], [False, False]]])
     seen = box_sides.innovations(mean, covariance, box, edges, LOG_VARIANCE, C)
     unmeasured, size = seen.unmeasured[:, 0], singer.expected_size(mean)
-    R = box_sides.measured_variance(seen.y[:, 0], seen.S[:, 0], seen.side_variance, size, unmeasured, C)
+    R = box_sides.measured_variance(seen.y[:, 0], seen.S[:, 0], seen.side_variance[:, 0], size, unmeasured, C)
     got, grown = box_sides.update(mean, covariance, seen.y[:, 0], seen.H, R)
     H, P, r = seen.H[0, 0, 1], covariance[0, 0], R[0, 0, 1]
     gain = P @ H / (H @ P @ H + r)
@@ -241,7 +241,7 @@ def test_the_mean_of_boxes_whose_errors_last_is_not_known_better_than_their_numb
             for i in range(runs)
         ]
         y, H = np.concatenate([s.y[:, 0] for s in each]), np.concatenate([s.H for s in each])
-        R = np.repeat(np.concatenate([s.side_variance for s in each])[..., None], 2, axis=2)
+        R = np.concatenate([s.side_variance[:, 0] for s in each])
         mean, covariance = box_sides.update(mean, covariance, y, H, R)
     off = mean[:, :, singer.POSITION] - (BOX[0, :2] + BOX[0, 2:]) / 2.0
     square = off**2 / covariance[..., singer.POSITION, singer.POSITION]

@@ -57,6 +57,22 @@ def parts(gap):
     return detections(t), np.array([[0, 1, 2], [3, 4, 5]])
 
 
+def test_a_side_has_the_variance_of_its_own_spread():
+    """Beside what lasts of the sensor's errors; a side without one has that of the sensor."""
+    seen = detections(np.array([0.0]))
+    spread = np.array([[[9.0, np.nan], [4.0, 25.0]]])
+    own = np.array([-6.0])
+    size = seen.boxes[:, 2:] - seen.boxes[:, :2]
+    s2 = (0.5 * np.sqrt(size.prod()) + 0.5 * size[0]) ** 2
+    low = spread[0, :, 0] + (np.exp(-5.0) - np.exp(-6.0)) * s2 + C.pixel_std**2
+    high = np.array([np.exp(-5.0) * s2[0], 25.0 + (np.exp(-5.0) - np.exp(-6.0)) * s2[1]]) + C.pixel_std**2
+    scene = SCENE._replace(log_own_variance=own)
+    R = joining._noise(seen._replace(spread=spread), np.array([0]), size, scene, C)[0]
+    np.testing.assert_allclose(R[:, 0, 0], (low + high) / 4.0)
+    np.testing.assert_allclose(R[:, 1, 1], (low + high) / size[0] ** 2)
+    np.testing.assert_allclose(R[:, 0, 1], (high - low) / (2.0 * size[0]))
+
+
 def test_the_likelihood_of_a_piece_is_that_of_a_dense_normal():
     seen, hits = parts(1.0)
     ends, begun = ends_of(seen, hits, SCENE, C), beginnings_of(seen, hits, SCENE, C)

@@ -79,10 +79,20 @@ def models(smoother, known, **changes):
     return [make(ModelConstants(**changes), config) for make in (CoreModel, ReferenceModel)]
 
 
-def looked(t, sensors, numbers, sides, logits, alike=None, motion=None):
+def looked(t, sensors, numbers, sides, logits, alike=None, motion=None, box_std=None):
     """Return a drawn scan as engines take it."""
     boxes = np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], axis=1)
-    return StepInput(t, sensors, numbers, boxes, 1.0 / (1.0 + np.exp(-logits)), alike, motion)
+    scores = 1.0 / (1.0 + np.exp(-logits))
+    return StepInput(t, sensors, numbers, boxes, scores, alike, motion, box_std=box_std)
+
+
+def drawn_std(rng, sides):
+    """Standard deviations of sides: from exact to useless, some unknown; or None, as of a scan without."""
+    if rng.random() < 0.2:
+        return None
+    size = np.tile(sides[:, 2:] - sides[:, :2], 2)
+    found = size * np.exp(rng.normal(np.log(0.06), 1.2, size.shape))
+    return np.where(rng.random(size.shape) < 0.15, np.nan, found)
 
 
 def declare(model):
@@ -99,21 +109,30 @@ def assert_alike(one, other, what, atol=_RELATIVE):
     np.testing.assert_allclose(one[4], other[4], atol=_RELATIVE, err_msg=what)
 
 
-@given(seed=st.integers(0, 10**6), sensors=st.integers(1, 4), known=st.booleans(), motions=st.booleans())
-def test_every_step_is_the_references(seed, sensors, known, motions):
+@given(
+    seed=st.integers(0, 10**6),
+    sensors=st.integers(1, 4),
+    known=st.booleans(),
+    motions=st.booleans(),
+    spreads=st.booleans(),
+)
+def test_every_step_is_the_references(seed, sensors, known, motions, spreads):
     core, reference = models("engine=none", known)
+    rng = np.random.default_rng(seed)
     for _ in range(sensors):
         declare(core)
         declare(reference)
     for k, scans in enumerate(drawn_stream(seed, sensors, 25, motions)):
-        core.take(looked(*scans))
+        inputs = looked(*scans, box_std=drawn_std(rng, scans[3]) if spreads else None)
+        core.take(inputs)
         core.hand_over()
-        reference.take(looked(*scans))
+        reference.take(inputs)
         reference.hand_over()
         assert_alike(core.rows(), reference.rows(), f"step {k}")
         np.testing.assert_array_equal(core.assigned(), reference.assigned())
         np.testing.assert_array_equal(core.living(), reference.living())
         assert core.size() == reference.size()
+        np.testing.assert_allclose(core.fit()[1], reference.fit()[1], rtol=_RELATIVE, err_msg=f"step {k}")
     ours, theirs = core.learnt(), reference.learnt()
     ours, theirs = ({**one.belief._asdict(), **one._asdict()} for one in (ours, theirs))
     for name in theirs.keys() - {"belief"}:

@@ -188,7 +188,8 @@ def test_a_track_goes_on_with_the_identity_whose_last_detection_it_has():
     owner = np.array([10, 20, 20, 10, -1, -1, -1])
     n = len(causal)
     number, t, sensor = np.arange(n), np.arange(n) / 10.0, np.zeros(n, int)
-    rows = WindowRows(number, t, sensor, np.zeros((n, 4)), causal, np.zeros(n), owner, np.zeros((n, 2)))
+    camera, std = np.zeros((n, 2)), np.full((n, 4), np.nan)
+    rows = WindowRows(number, t, sensor, np.zeros((n, 4)), causal, np.zeros(n), owner, camera, std)
     assert continuing(rows, causal).tolist() == [-10, -20, -20, -10, -20, -10, 3]
     # A track whose identity went on with another one in the meantime continues nothing.
     rows = rows._replace(owner=np.array([10, 20, 10, 10, -1, -1, -1]))

@@ -223,6 +223,7 @@ FORGED = {
     "accuracy.lasting": [-1.0, np.inf],
     "belief.score_weight": [-1.0, np.inf],
     "sensor0.given_lasting": [-1.0, 4.0],
+    "sensor0.mean_spread": [-1.0, 0.0, np.inf],
     "tracks.apart": [1e9],
     "tracks.apart_s": [1e9],
     "log_side_variance": [1e4],

@@ -86,9 +86,10 @@ struct Gates {
     }
 };
 
-// How far a box's left side (axis 0), or its top, may lie from the expected one at most.
-inline double reach(const SidesExpected& expected, int axis, const Gates& gates, const ModelConstants& c) {
-    const double whole = std::sqrt(std::max(gates.whole, gates.cut) * expected.S[axis].ll);
+// How far a box's left side (axis 0), or its top, may lie from the expected one at most; `more` is what its variance may
+// be more than expected.
+inline double reach(const SidesExpected& expected, int axis, double more, const Gates& gates, const ModelConstants& c) {
+    const double whole = std::sqrt(std::max(gates.whole, gates.cut) * (expected.S[axis].ll + more));
     return std::max(std::max(1.0, c.most_uncovered) * expected.size[axis], whole);
 }
 

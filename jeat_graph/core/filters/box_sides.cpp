@@ -107,11 +107,12 @@ JEAT_GRAPH_WIDE void update(double* mean, double* covariance, const std::array<d
         const double left = y[2 * axis], right = y[2 * axis + 1];
         double *const m = mean + axis * kStates, *const P = covariance + axis * kMatrix;
         const auto cut = cut_probabilities(left, right, expected, axis, logs);
-        const double R = expected.variance[axis] * (cut[0] + cut[1] > 0.5 ? 1.0 : heavy);
+        const double tail = cut[0] + cut[1] > 0.5 ? 1.0 : heavy;
+        const double Rl = expected.variance[2 * axis] * tail, Rr = expected.variance[2 * axis + 1] * tail;
         const double none = square(kUnmeasured * expected.size[axis]);
         update_axis(m, P, left_over[2 * axis], left_over[2 * axis + 1], exp_of(m[kLogSize] + m[kSizeError]),
-                    unmeasured.at[2 * axis] ? none : R / std::max(1.0 - cut[0], kLeastProbability),
-                    unmeasured.at[2 * axis + 1] ? none : R / std::max(1.0 - cut[1], kLeastProbability));
+                    unmeasured.at[2 * axis] ? none : Rl / std::max(1.0 - cut[0], kLeastProbability),
+                    unmeasured.at[2 * axis + 1] ? none : Rr / std::max(1.0 - cut[1], kLeastProbability));
     }
 }
 

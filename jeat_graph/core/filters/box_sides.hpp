@@ -26,8 +26,9 @@ struct Pair2 {
 // Of one track before it is compared with boxes.
 struct SidesExpected {
     Sides box;
-    std::array<double, 2> size, variance;  // of one measured side, by axis
-    std::array<Pair2, 2> S;                // covariance of the innovation
+    std::array<double, 2> size;      // by axis
+    std::array<double, 4> variance;  // of the measured sides: left, right, top, bottom
+    std::array<Pair2, 2> S;          // covariance of the innovation
     // Natural logarithms of its determinant, of the variance of the left (upper) side and of the right (lower) one, and of
     // the size.
     std::array<double, 2> log_det, log_left, log_right, log_size;
@@ -46,9 +47,12 @@ struct ShareLogs {
     explicit ShareLogs(const ModelConstants& c) : cut(log_of(c.cut_share)), uncovered(log_of(c.uncovered_share)) {}
 };
 
+// What the error of a side is in proportion to: of width or height and the size, in px.
+inline double side_scale(double size, double both) { return 0.5 * both + 0.5 * size; }
+
 // rho^2 of the sensor, its variance in sizes^2.
 inline double side_variance(double size, double both, double rho2, const ModelConstants& c) {
-    return rho2 * square(0.5 * both + 0.5 * size) + square(c.pixel_std);
+    return rho2 * square(side_scale(size, both)) + square(c.pixel_std);
 }
 
 inline SidesExpected expected_sides(const double* mean, const double* covariance, double rho2,
@@ -64,7 +68,7 @@ inline SidesExpected expected_sides(const double* mean, const double* covariance
         const double b = w * sum(kPosition, kPositionError, kLogSize, kSizeError);
         const double d = w * w / 4.0 * sum(kLogSize, kSizeError, kLogSize, kSizeError);
         const double R = side_variance(w, both, rho2, c);
-        out.variance[axis] = R;
+        out.variance[2 * axis] = out.variance[2 * axis + 1] = R;
         out.S[axis] = {a - b + d + R, a - d, a + b + d + R};
         out.take_logs(axis);
         out.log_size[axis] = log_of(w);
@@ -128,21 +132,24 @@ bool uncover_sides(double* mean, double* covariance, std::array<double, 4>& y, c
 void update(double* mean, double* covariance, const std::array<double, 4>& y, const std::array<double, 4>& left_over,
             const SidesExpected& expected, const Edges& unmeasured, const ShareLogs& logs, const ModelConstants& c);
 
-// The state of a track that begins at a box.
-inline void initial_state(const Sides& box, const Edges& edges, double rho2, double scene_rho2, const ModelConstants& c, double* mean,
-                          double* covariance) {
+// The state of a track that begins at a box; `more` is what the variances of its sides are more by its own spread.
+inline void initial_state(const Sides& box, const Edges& edges, double rho2, double scene_rho2, const std::array<double, 4>& more,
+                          const ModelConstants& c, double* mean, double* covariance) {
     std::fill(mean, mean + kMean, 0.0);
     std::fill(covariance, covariance + kCovariance, 0.0);
     const double size[] = {box.width(), box.height()}, both = std::sqrt(size[0] * size[1]);
     const double centre[] = {(box.left + box.right) / 2.0, (box.top + box.bottom) / 2.0};
     for (int axis = 0; axis < 2; ++axis) {
         const double R = side_variance(size[axis], both, rho2, c);
+        const double Rl = R + more[2 * axis], Rr = R + more[2 * axis + 1];
         mean[axis * kStates + kPosition] = centre[axis];
         mean[axis * kStates + kLogSize] = log_of(size[axis]);
         const LastingError error(size[axis], both, scene_rho2, c);
-        const double variance[] = {R / 2.0, square(c.velocity_std * both), square(c.acceleration_std * both),
-                                   2.0 * R / square(size[axis]), square(c.growth_std), error.position, error.size};
-        for (int i = 0; i < kStates; ++i) covariance[axis * kMatrix + i * kStates + i] = variance[i];
+        const double variance[] = {(Rl + Rr) / 4.0, square(c.velocity_std * both), square(c.acceleration_std * both),
+                                   (Rl + Rr) / square(size[axis]), square(c.growth_std), error.position, error.size};
+        double* const P = covariance + axis * kMatrix;
+        for (int i = 0; i < kStates; ++i) P[i * kStates + i] = variance[i];
+        P[kPosition * kStates + kLogSize] = P[kLogSize * kStates + kPosition] = (Rr - Rl) / (2.0 * size[axis]);
         // How far it reaches beyond the edge nobody knows.
         for (int side = 0; side < 2; ++side)
             if (edges.at[2 * axis + side])

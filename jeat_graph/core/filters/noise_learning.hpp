@@ -45,6 +45,11 @@ struct InnovationSums {
             if (known) (k < 2 ? lag_centre : lag_extent) += e[k] * before[k];
         }
     }
+
+    // The weight of a scan: few tracks teach little, and a fast sensor's scans repeat its errors.
+    double share(double period_s, const ModelConstants& c) const {
+        return std::min(1.0, teachers / c.noise_tracks) * std::min(1.0, period_s / c.noise_period_s);
+    }
 };
 
 inline double bounded_log_variance(double log_variance, const Bounds& bounds) {
@@ -54,7 +59,7 @@ inline double bounded_log_variance(double log_variance, const Bounds& bounds) {
 inline void learn_noise(const InnovationSums& sums, double period_s, double& log_variance, ProcessNoise& q,
                         const ModelConstants& c) {
     if (sums.teachers == 0.0) return;
-    const double share = std::min(1.0, sums.teachers / c.noise_tracks) * std::min(1.0, period_s / c.noise_period_s);
+    const double share = sums.share(period_s, c);
     const double excess = sums.squares / (4.0 * sums.teachers) - c.nis_target;
     log_variance = bounded_log_variance(log_variance + c.noise_rate * share * excess, c.side_std_bounds);
     const double centre = share * sums.lag_centre / (2.0 * sums.teachers);

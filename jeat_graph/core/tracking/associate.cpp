@@ -15,6 +15,16 @@ bool reaches_edge(const Sides& box, const State& state) {
     return !(box.left > edge && box.top > edge && box.right < state.width - edge && box.bottom < state.height - edge);
 }
 
+// The largest variances of a left (upper) side by axis by the boxes' own spreads; none without any.
+std::array<double, 2> most_variance(const CorrectedBoxes& scan, const SpreadNoise& noise) {
+    std::array<double, 2> most{};
+    for (std::size_t j = 0; j < scan.spreads.size(); ++j) {
+        const BySide more = noise.more(scan.spreads[j], scan.boxes[j], {0.0, 0.0});
+        for (std::size_t axis = 0; axis < 2; ++axis) most[axis] = std::max(most[axis], more[2 * axis]);
+    }
+    return most;
+}
+
 bool is_owned(const Scan& scan, std::size_t box) { return !scan.owners.empty() && scan.owners[box] >= 0; }
 
 }  // namespace
@@ -22,7 +32,11 @@ bool is_owned(const Scan& scan, std::size_t box) { return !scan.owners.empty() &
 void Associator::associate(const State& state, const CorrectedBoxes& scan, Scan& given, AssociatedPairs& out) {
     const ModelConstants& c = state.constants;
     const std::size_t n = state.tracks.size();
-    given.noise_scale = state.noise(given.sensor) / square(c.side_std);
+    const double noise = state.noise(given.sensor);
+    const SpreadNoise spread = state.spread_noise(given.sensor);
+    given.noise_scale.assign(scan.size(), noise / square(c.side_std));
+    for (std::size_t j = 0; j < scan.spreads.size(); ++j)
+        given.noise_scale[j] = spread.mean_noise(noise, scan.spreads[j]) / square(c.side_std);
     const double least_of_clutter = weigh_scores(state, given);
     weigh_boxes(scan, given, c, out.confirms);
     order_owners(given);
@@ -30,6 +44,7 @@ void Associator::associate(const State& state, const CorrectedBoxes& scan, Scan&
     const auto& chosen = assignment_.solve(by_appearance(given), n, scan.size(), c.exact_assignment);
     out.made.clear();
     out.innovation.clear();
+    out.by_spread.clear();
     out.pair_of.assign(n, chosen.size());
     out.track_of.assign(scan.size(), n);
     for (const std::size_t k : chosen) {
@@ -38,6 +53,8 @@ void Associator::associate(const State& state, const CorrectedBoxes& scan, Scan&
         out.track_of[pair.column] = pair.row;
         out.made.push_back(pair);
         out.innovation.push_back(side_innovations(scan.boxes[pair.column], out.expected[pair.row].box));
+        if (!scan.spreads.empty())
+            out.by_spread.push_back(scan.with_own_spread(out.expected[pair.row], pair.column, spread));
     }
 }
 
@@ -78,6 +95,8 @@ void Associator::find_candidates(const State& state, const CorrectedBoxes& scan,
     const ModelConstants& c = state.constants;
     const std::size_t n = tracks.size(), k = given.sensor;
     const double rho2 = state.noise(k);
+    const SpreadNoise spread = state.spread_noise(k);
+    const std::array<double, 2> most = most_variance(scan, spread);
     const association::ScanTerms terms(state.sensors[k].leftovers, state.width * state.height, c);
     out.expected.resize(n);
     out.p_detect.resize(n);
@@ -91,7 +110,7 @@ void Associator::find_candidates(const State& state, const CorrectedBoxes& scan,
                                association::kMostPDetect);
         const double clutter = terms.log_clutter - log_of(expected.size[0] * expected.size[1]);
         const double real = std::max(tracks.real[i], association::kLeastPosterior);
-        const TrackTerms track{expected, log_of(p / (1.0 - p)) - clutter, real};
+        const TrackTerms track{expected, spread, log_of(p / (1.0 - p)) - clutter, real};
         if (tracks.given[i] >= 0) {
             // Its box is given, however far off: that is no reason to doubt that it is real.
             const std::size_t j = box_of(tracks.given[i]);
@@ -99,13 +118,14 @@ void Associator::find_candidates(const State& state, const CorrectedBoxes& scan,
                 candidates_.push_back({i, j, std::max(log_ratio(track, scan, j, terms, c), association::kLeastGain)});
             continue;
         }
-        // A box that the edge cuts may lie farther off, but is only compared so where the object reaches the edge.
+        // A box that the edge cuts may lie farther off, but is only compared so where the object reaches the edge. What a
+        // box with a spread of its own can gain is not known beforehand.
         const double best = (std::max(real, 1.0 - real) + c.score_floor) / least_of_clutter;
-        const association::Gates gates = reaches_edge(expected.box, state)
+        const association::Gates gates = reaches_edge(expected.box, state) || !scan.spreads.empty()
                                              ? association::Gates(c)
                                              : association::Gates(expected, track.start + log_of(best), terms, c);
-        const double reach = association::reach(expected, 0, gates, c);
-        const double above = association::reach(expected, 1, gates, c);
+        const double reach = association::reach(expected, 0, most[0], gates, c);
+        const double above = association::reach(expected, 1, most[1], gates, c);
         const auto weigh = [&](std::size_t j, const Sides& box) {
             if (std::abs(box.top - expected.box.top) > above || is_owned(given, j)) return;
             const double gain = log_ratio(track, scan, j, terms, c);
@@ -120,9 +140,11 @@ double Associator::log_ratio(const TrackTerms& track, const CorrectedBoxes& scan
                              const association::ScanTerms& terms, const ModelConstants& c) const {
     const auto y = side_innovations(scan.boxes[box], track.expected.box);
     const Edges cut = unmeasured_sides(y, scan.edges[box]);
-    const double density = cut.any()
-                               ? association::sides_log_density(y, with_cut(track.expected, cut, c), terms, c)
-                               : association::sides_log_density(y, track.expected, terms, c);
+    SidesExpected own;
+    const SidesExpected* expected = &track.expected;
+    if (!scan.spreads.empty()) own = scan.with_own_spread(*expected, box, track.spread), expected = &own;
+    if (cut.any()) own = with_cut(*expected, cut, c), expected = &own;
+    const double density = association::sides_log_density(y, *expected, terms, c);
     if (density <= association::kImpossible) return density;
     const double of_track = association::score_likelihood(track.real, q_[box], c);
     return track.start + density + log_of(of_track / of_clutter_[box]);

@@ -20,6 +20,7 @@ private:
     // What all pairs of one track have in common: `start` is what neither score nor place say of ln L.
     struct TrackTerms {
         const SidesExpected& expected;
+        const SpreadNoise& spread;
         double start, real;
     };
 

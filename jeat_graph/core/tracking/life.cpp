@@ -99,11 +99,14 @@ void begin_tracks(State& state, const Scan& given, const CorrectedBoxes& scan, c
     const Rivals rivals(state, scan, free);
     append_rows(tracks, n, free.size());
     const double rho2 = state.noise(k), scene_rho2 = exp_of(state.log_scene_variance());
+    const SpreadNoise spread = state.spread_noise(k);
     for (std::size_t f = 0; f < free.size(); ++f) {
         const std::size_t row = n + f, j = free[f];
         may_be_interrupted();
         const double overlap = rivals.most(scan.boxes[j], given.logits[j], given.logits, free);
-        initial_state(scan.boxes[j], scan.edges[j], rho2, scene_rho2, c, tracks.mean_of(row), tracks.covariance_of(row));
+        const Sides& box = scan.boxes[j];
+        const BySide more = scan.spreads.empty() ? BySide{} : spread.more(scan.spreads[j], box, {box.width(), box.height()});
+        initial_state(box, scan.edges[j], rho2, scene_rho2, more, c, tracks.mean_of(row), tracks.covariance_of(row));
         with_velocity(tracks.mean_of(row), state.camera_velocity);
         tracks.track_id[row] = state.next_id++;
         tracks.given[row] = given.owners.empty() ? -1 : given.owners[j];

@@ -36,6 +36,13 @@ bool finite(std::span<const double> values) {
     return true;
 }
 
+// What is not known is NaN.
+bool none_below_0(std::span<const double> values) {
+    for (const double value : values)
+        if (value < 0.0 || std::isinf(value)) return false;
+    return true;
+}
+
 // All that the next step depends on, and what the last one gave.
 struct Moment {
     State state;
@@ -123,7 +130,7 @@ public:
 
     void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
               const std::optional<In2<double>>& similarity, const std::optional<In<double>>& motion,
-              const std::optional<In2<double>>& owners) {
+              const std::optional<In2<double>>& owners, const std::optional<In2<double>>& box_std) {
         State& state = now_.state;
         check(std::isfinite(t), "no such time");
         check(!state.started || t >= state.t, "a time before that of the last step");
@@ -137,6 +144,9 @@ public:
         if (owners) check_lengths({owners->shape(0), logits.size()});
         if (owners) check(owners->shape(1) == 3, "owners are given with whether more of theirs are to come, and a posterior");
         if (owners) check(finite(span(*owners)), "owners are finite");
+        if (box_std) check_lengths({box_std->shape(0), logits.size()});
+        if (box_std) check(box_std->shape(1) == 4, "spreads have four numbers");
+        if (box_std) check(none_below_0(span(*box_std)), "spreads are not below 0");
         std::optional<PictureMotion> moved;
         if (motion) {
             check_lengths({motion->size(), kMotionNumbers});
@@ -151,10 +161,11 @@ public:
             scan.sensor = static_cast<std::size_t>(sensors.data()[k]);
             check(scan.sensor < state.sensors.size(), "no such sensor");
             check(number <= logits.size() - at, "fewer boxes than said");
-            scan.boxes.clear();
+            scan.boxes.clear(), scan.spreads.clear();
             for (std::size_t j = at; j < at + number; ++j) {
                 const double* const box = boxes.data() + 4 * j;
                 scan.boxes.push_back({box[0], box[1], box[0] + box[2], box[1] + box[3]});
+                if (box_std) scan.spreads.push_back(filters::spread_squares(box_std->data() + 4 * j, box[2], box[3], state.constants));
             }
             scan.logits.assign(logits.data() + at, logits.data() + at + number);
             scan.similarity = {nullptr, 0, 0};
@@ -329,6 +340,11 @@ public:
         for (double& variance : noise) variance = log_of(variance);
         out["log_side_variance"] = array_of(noise);
         out["lasting"] = array_of(state.accuracy.lasting);
+        std::vector<double> gains;
+        for (std::size_t k = 0; k < state.sensors.size(); ++k)
+            gains.push_back(state.spread_noise(k).gain);
+        out["log_own_variance"] = array_of(state.log_side_variance);
+        out["spread_gain"] = array_of(gains);
         std::vector<double> offsets;
         for (std::size_t k = 0; k < state.sensors.size(); ++k) {
             const auto offset = state.offsets.offset(k, state.noises(), state.constants);
@@ -358,7 +374,7 @@ private:
         for (const Scan& scan : scans_) {
             answer.assigned.insert(answer.assigned.end(), scan.assigned.begin(), scan.assigned.end());
             answer.nis.insert(answer.nis.end(), scan.nis.begin(), scan.nis.end());
-            answer.noise_scale.insert(answer.noise_scale.end(), scan.boxes.size(), scan.noise_scale);
+            answer.noise_scale.insert(answer.noise_scale.end(), scan.noise_scale.begin(), scan.noise_scale.end());
         }
         answer.living = tracks.track_id;
         answer.real = tracks.real;
@@ -443,13 +459,15 @@ void bind(nb::module_& module) {
         .def("take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
              nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("similarity").noconvert() = nb::none(),
              nb::arg("motion").noconvert() = nb::none(), nb::arg("owners").noconvert() = nb::none(),
+             nb::arg("box_std").noconvert() = nb::none(),
              "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
              "top, width, height (px), logits of their scores (M,); similarity (N, M): how much more likely each box is of a\n"
              "living track than of another by what both look like, as ln of the ratio; motion (11,): of the camera since\n"
              "its picture before, see jeat_graph.filters.picture_motion.PictureMotion; owners (M, 3): whose each box is,\n"
              "where that is given, below 0 for nobody's, at most one box of a scan each, and 1 where more of its owner's are\n"
              "to come, and the posterior of an object there by what comes later, for the smoother, below 0 where it is not\n"
-             "known. A track of an owner takes no box but its own, and lives as long as it is awaited.")
+             "known. A track of an owner takes no box but its own, and lives as long as it is awaited; box_std (M, 4): standard\n"
+             "deviations of left, top, right, bottom by the detector (px), NaN where unknown.")
         .def("record", exclusive(&Model::record), "What the last step gave the smoother; once.")
         .def("hand_over", exclusive(&Model::hand_over), nb::arg("record").none() = nb::none(),
              nb::arg("given").noconvert() = nb::none(), nb::arg("label").noconvert() = nb::none(),

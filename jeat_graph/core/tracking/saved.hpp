@@ -143,7 +143,7 @@ void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_
 
 template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix, Sensor& sensor) {
     auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_scan_s, repetition, even_logit,
-           given_lasting] = sensor;
+           given_lasting, mean_spread] = sensor;
     v.numbers(prefix + "leftovers", &leftovers, 1);
     v.numbers(prefix + "false_boxes", &false_boxes, 1);
     v.numbers(prefix + "boxes_at_edge", &boxes_at_edge, 1);
@@ -152,6 +152,7 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
     v.numbers(prefix + "last_scan_s", &last_scan_s, 1, Values::any);
     v.numbers(prefix + "even_logit", &even_logit, 1, Values::any);
     v.numbers(prefix + "given_lasting", &given_lasting, 1, Values::any);
+    v.numbers(prefix + "mean_spread", &mean_spread, 1, Values::any);
     auto& [boxes, repeated, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
     std::size_t rows = last_boxes.size();
     v.whole(prefix + "rows", rows);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "filters/box_sides.hpp"
+#include "filters/box_spread.hpp"
 #include "filters/camera_motion.hpp"
 #include "filters/camera_path.hpp"
 #include "filters/columns.hpp"
@@ -106,6 +107,8 @@ struct Sensor {
     double even_logit = std::numeric_limits<double>::quiet_NaN();
     // And the variance of what lasts of its errors (sizes²), NaN where it is to be learnt.
     double given_lasting = std::numeric_limits<double>::quiet_NaN();
+    // The mean square of the spreads that it gives with its boxes (sizes²), NaN where none is known.
+    double mean_spread = std::numeric_limits<double>::quiet_NaN();  // learn_noise
 };
 
 struct State {
@@ -141,6 +144,7 @@ struct State {
     double noise(std::size_t k) const {
         return side_noise(log_side_variance[k], offsets.compared(k), accuracy.lasting[k], constants);
     }
+    SpreadNoise spread_noise(std::size_t k) const { return {log_side_variance[k], sensors[k].mean_spread}; }
     std::vector<double> noises() const {
         std::vector<double> out(sensors.size());
         for (std::size_t k = 0; k < out.size(); ++k) out[k] = noise(k);

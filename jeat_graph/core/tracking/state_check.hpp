@@ -14,6 +14,8 @@ namespace jeat::tracking {
 
 // ln of a variance, or of a density, that no scene has comes from no learning.
 inline constexpr double kMostLogVariance = 100.0;
+// Mean squares of spreads beyond these are of no bounds that anybody chooses.
+inline constexpr double kLeastSpread = 1e-12, kMostSpread = 1e12;
 // Sums of so many scans come from no recording.
 inline constexpr double kMostCount = 1e15;
 // Of shares and sums that are computed, by which they may miss what they are exactly.
@@ -150,6 +152,7 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
     check_past(name + "last_scan_s", sensor.last_scan_s, now);
     require(!(std::abs(sensor.even_logit) > kMostLogVariance), name + "even_logit", "is of no score");
     require(!(sensor.given_lasting < 0.0) && !(sensor.given_lasting > 1.0), name + "given_lasting", "is no variance");
+    require(!(sensor.mean_spread < kLeastSpread) && !(sensor.mean_spread > kMostSpread), name + "mean_spread", "is no variance");
     const RepeatCounts& counts = sensor.repetition;
     for (int bin = 0; bin < kScoreBins; ++bin) {
         const double boxes = counts.boxes[static_cast<std::size_t>(bin)], repeated = counts.repeated[static_cast<std::size_t>(bin)];

@@ -92,6 +92,7 @@ void correct_boxes(const State& state, const Scan& scan, CorrectedBoxes& out) {
     const bool cuts = state.picture_known && sensor.boxes_at_edge >= sensor.boxes_beyond;
     out.boxes.clear();
     out.edges.clear();
+    out.spreads = scan.spreads;
     for (const Sides& box : scan.boxes) {
         out.boxes.push_back(corrected(box, offset));
         out.edges.push_back(cuts ? edges_of(box, state.width, state.height, c) : Edges{});
@@ -103,7 +104,7 @@ void correct_boxes(const State& state, const Scan& scan, CorrectedBoxes& out) {
 void assigned_tracks(const State& state, const AssociatedPairs& pairs, Scan& scan) {
     scan.nis.assign(scan.boxes.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t m = 0; m < pairs.made.size(); ++m)
-        scan.nis[pairs.made[m].column] = centre_distance(pairs.innovation[m], pairs.expected[pairs.made[m].row]);
+        scan.nis[pairs.made[m].column] = centre_distance(pairs.innovation[m], pairs.expected_of(m));
     scan.assigned.resize(scan.boxes.size());
     for (std::size_t j = 0; j < scan.boxes.size(); ++j) scan.assigned[j] = state.tracks.track_id[pairs.track_of[j]];
 }

@@ -24,20 +24,27 @@ void learn_noise(State& state, std::size_t sensor, const CorrectedBoxes& scan, c
     Tracks& tracks = state.tracks;
     const ModelConstants& c = state.constants;
     InnovationSums sums;
+    SpreadSums spreads;
     for (std::size_t m = 0; m < pairs.made.size(); ++m) {
         const std::size_t i = pairs.made[m].row;
         if (scan.edges[pairs.made[m].column].any()) {
             tracks.has_innovation[i] = 0;
             continue;
         }
-        const Innovation e = normalised_innovation(pairs.innovation[m], pairs.expected[i], c);
+        const std::size_t j = pairs.made[m].column;
+        const SidesExpected& expected = pairs.expected_of(m);
+        const Innovation e = normalised_innovation(pairs.innovation[m], expected, c);
         double* const before = tracks.innovation.data() + i * 4;
-        if (tracks.evidence.detections[i] > c.noise_hits && tracks.real[i] > c.report)
+        if (tracks.evidence.detections[i] > c.noise_hits && tracks.real[i] > c.report) {
             sums.add(e, before, tracks.has_innovation[i], c);
+            if (!scan.spreads.empty()) spreads.add(scan.spreads[j], scan.boxes[j], expected.size);
+        }
         std::copy(e.begin(), e.end(), before);
         tracks.has_innovation[i] = 1;
     }
-    filters::learn_noise(sums, clock.period_s, state.log_side_variance[sensor], state.process_noise, c);
+    double& log_variance = state.log_side_variance[sensor];
+    spreads.learn(sums.share(clock.period_s, c), log_variance, state.sensors[sensor].mean_spread, c);
+    filters::learn_noise(sums, clock.period_s, log_variance, state.process_noise, c);
 }
 
 void update(State& state, const CorrectedBoxes& scan, const AssociatedPairs& pairs, const ShareLogs& logs,
@@ -50,7 +57,7 @@ void update(State& state, const CorrectedBoxes& scan, const AssociatedPairs& pai
         double *const mean = tracks.mean_of(i), *const covariance = tracks.covariance_of(i);
         const auto& y = pairs.innovation[m];
         const Edges cut = unmeasured_sides(y, scan.edges[pairs.made[m].column]);
-        const SidesExpected expected = cut.any() ? with_cut(pairs.expected[i], cut, c) : pairs.expected[i];
+        const SidesExpected expected = cut.any() ? with_cut(pairs.expected_of(m), cut, c) : pairs.expected_of(m);
         std::array<double, 4> left_over = y;
         // To the smoother a side that shows again is part of the prediction: the states before did not know of it.
         if (uncover_sides(mean, covariance, left_over, expected, cut, logs, c) && record)

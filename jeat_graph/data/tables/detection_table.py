@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray, TextArray
+from jeat_graph.data.box_std import STD_COLUMNS, find_bad_std, known_std
 from jeat_graph.data.boxes import find_bad_row, without_area
 from jeat_graph.data.camera_motion import CAMERA_MOTION, MOTION_NUMBERS, bad_motions, motion_rows
 from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR, standing_in
@@ -23,7 +24,7 @@ from jeat_graph.data.tables.reading import Reading
 
 #: Columns that a table of detections needs, or others that can stand for them, and those that it may have.
 REQUIRED = ("t", *BOX)
-OPTIONAL = ("sensor", "score", "embedding", CAMERA_MOTION, *ASIDE)
+OPTIONAL = ("sensor", "score", *STD_COLUMNS, "embedding", CAMERA_MOTION, *ASIDE)
 
 
 class DetectionRows(NamedTuple):
@@ -39,6 +40,7 @@ class DetectionRows(NamedTuple):
         empty: (R,) true where a row only says that its scan took place.
         embeddings: (R, E), or None.
         camera_motion: (R, 11), NaN in rows that say nothing of it; or None.
+        box_std: (R, 4) standard deviations of the sides (px), NaN where unknown; or None.
         dropped: rows whose box has no area; they are among the empty ones.
         frames: the frame numbers where the table counts frames, else None.
     """
@@ -52,6 +54,7 @@ class DetectionRows(NamedTuple):
     empty: BoolArray
     embeddings: EmbeddingArray | None
     camera_motion: FloatArray | None
+    box_std: FloatArray | None
     dropped: int
     frames: FrameCount | None
 
@@ -95,9 +98,8 @@ def rows_of_detections(
     flat = without_area(boxes) & ~empty
     check_rows(boxes, scores, empty | flat, table.error)
     motions = read_motions(table) if CAMERA_MOTION in table else None
-    rows = DetectionRows(
-        t, named, code, boxes, scores, classes, empty | flat, embedded, motions, int(flat.sum()), times.count
-    )
+    found = boxes, scores, classes, empty | flat, embedded, motions, read_std(table)
+    rows = DetectionRows(t, named, code, *found, int(flat.sum()), times.count)
     fills = times.frames is not None and "sensor" not in table and not empty.any() and how.fill_empty
     return _with_frames_between(rows, times, how, table) if fills and len(t) and embedded is None else rows
 
@@ -131,6 +133,7 @@ def _with_frames_between(rows: DetectionRows, times: Times, how: Reading, table:
         camera_motion=None
         if rows.camera_motion is None
         else np.concatenate([rows.camera_motion, np.full((count, MOTION_NUMBERS), np.nan)]),
+        box_std=None if rows.box_std is None else np.concatenate([rows.box_std, np.full((count, 4), np.nan)]),
     )
 
 
@@ -142,6 +145,20 @@ def read_embeddings(table: FileTable) -> EmbeddingArray | None:
         raise table.error(bad, "embedding must be finite and not all zero")
     found = unit_embeddings(vectors, len(vectors))
     return None if np.isnan(found).all() else found
+
+
+def read_std(table: FileTable) -> FloatArray | None:
+    """How sure the detector is of the sides of rows (R, 4), in px; None where no row says it."""
+    there = [name for name in STD_COLUMNS if name in table]
+    if not there:
+        return None
+    found = np.full((len(table), 4), np.nan)
+    for name in there:
+        found[:, STD_COLUMNS.index(name)] = table.number(name, blank_ok=True)
+    bad = find_bad_std(found)
+    if bad is not None:
+        raise table.error(*bad)
+    return known_std(found)
 
 
 def read_motions(table: FileTable) -> FloatArray | None:

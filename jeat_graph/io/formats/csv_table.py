@@ -16,7 +16,8 @@ FORMAT = BoxFormat(
     name="csv",
     title="CSV",
     reads="`t` (s), `sensor`, `left, top, width, height` (px), `score` (0 to 1), optional `class`, "
-    "`embedding` and `camera_motion`; rows in any order (their order changes nothing but the numbers of "
+    "`left_std, top_std, right_std, bottom_std` (px), `embedding` and `camera_motion`; rows in any "
+    "order (their order changes nothing but the numbers of "
     "tracks)",
     recognise=_recognise,
     read=None,

@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
+from jeat_graph.data.box_std import STD_COLUMNS
 from jeat_graph.data.class_columns import LISTS_COUNT_FROM
 from jeat_graph.data.column_names import BOX, FRAME_COLUMNS, standing_in, usual_names
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.frame_columns import ASIDE, named_columns
 from jeat_graph.data.tables.columns import boxes_of, classes_of, of_one_video, times_of
+from jeat_graph.data.tables.detection_table import read_std
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.frame_filling import fill_frames
 from jeat_graph.data.tables.reading import Reading
@@ -26,7 +28,7 @@ from jeat_graph.io.formats.record import BoxFormat, Certainty, FileBoxes, FileHe
 from jeat_graph.io.tables.class_names import names_by_number
 from jeat_graph.io.tables.csv_text import read_text
 
-_OPTIONAL = ("score", "object_id", *ASIDE)
+_OPTIONAL = ("score", *STD_COLUMNS, "object_id", *ASIDE)
 _RATES = ("video_fps", "fps", "frame_rate")
 _NO_IDENTITY = -1
 
@@ -74,6 +76,7 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
         error=table.error,
         recorded=recorded,
         scores=None if np.isnan(scores).all() else np.where(np.isnan(scores), 1.0, scores),
+        box_std=read_std(table),
         ids=ids,
         classes=classes_of(table, names_by_number(how.class_names, path, LISTS_COUNT_FROM)),
         frames=times.count,

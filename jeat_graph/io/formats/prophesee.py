@@ -1,8 +1,8 @@
 """Box arrays of Prophesee's data sets and of DSEC: structured NumPy arrays, read by field name.
 
 Fields: `t` or `ts` (µs), `x, y, w, h` (px), and as far as there `class_id`, `track_id`, and
-`class_confidence` or `confidence`. The numbers of classes mean different things in different data sets, so
-a class is given as its number in text.
+`class_confidence` or `confidence`, `left_std` and so on. The numbers of classes mean different things in
+different data sets, so a class is given as its number in text.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.class_columns import LISTS_COUNT_FROM, name_classes
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.tables.detection_table import read_std
 from jeat_graph.data.tables.file_table import FileTable
 from jeat_graph.data.tables.frame_filling import gap_times
 from jeat_graph.data.tables.reading import Reading
@@ -100,6 +101,7 @@ def read_boxes(path: str | Path, how: Reading, _truth: bool = False) -> FileBoxe
         error=table.error,
         recorded=recorded,
         scores=table.number("class_confidence") if "class_confidence" in table else None,
+        box_std=read_std(table),
         ids=table.whole("track_id") if "track_id" in table else None,
         classes=name_classes(class_names(table), names),
     )
@@ -115,7 +117,7 @@ FORMAT = BoxFormat(
     name="prophesee",
     title="Prophesee, DSEC",
     reads="box arrays (`.npy`), fields found by name: `t` or `ts` (µs), `x, y, w, h`, `class_confidence` or "
-    "`confidence`, `track_id`, `class_id`",
+    "`confidence`, `left_std, top_std, right_std, bottom_std`, `track_id`, `class_id`",
     recognise=_recognise,
     read=read_boxes,
     counts_frames=no_frames,

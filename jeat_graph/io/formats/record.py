@@ -32,6 +32,7 @@ class FileBoxes:
         recorded: gives all times (T,) at which the file says, or lets suppose, that it was looked (s).
         scores: (R,) as the file has them; None where it has none.
         ids: (R,) identities, or None.
+        box_std: (R, 4) standard deviations of left, top, right, bottom (px), NaN where unknown, or None.
         classes: (R,) names, or numbers as text, or None.
         ignore: (R,) true for what is not to be judged, or None.
         distance: (R,) from the camera (m), NaN where unknown, or None.
@@ -45,6 +46,7 @@ class FileBoxes:
     error: Callable[[int, str], DataError]
     recorded: Callable[[], FloatArray]
     scores: FloatArray | None = None
+    box_std: FloatArray | None = None
     ids: IntArray | None = None
     classes: TextArray | None = None
     ignore: BoolArray | None = None
@@ -55,7 +57,7 @@ class FileBoxes:
 
     def take(self, rows: IntArray) -> FileBoxes:
         """Return some of the boxes, whose errors still name the file's own places."""
-        names = ("scores", "ids", "classes", "ignore", "distance", "truncation", "occlusion")
+        names = ("scores", "box_std", "ids", "classes", "ignore", "distance", "truncation", "occlusion")
         columns: dict[str, Any] = {name: getattr(self, name) for name in names}
         columns = {name: None if column is None else column[rows] for name, column in columns.items()}
         return replace(

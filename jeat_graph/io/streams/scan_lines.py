@@ -24,10 +24,10 @@ _KEYS = ("t", "sensor", "boxes", "scores")
 #: What may stand for `t`: a time in another unit, the number of a frame, the name of a picture.
 _TIMES = ("t", *TIME_COLUMNS, *FRAME_COLUMNS)
 # What may follow, one entry a box: names of classes, their numbers, lists of numbers or null; and the video.
-_CLASSES, _CLASS_ID, _EMBEDDINGS, _VIDEO = "classes", "class_id", "embeddings", "video"
+_CLASSES, _CLASS_ID, _EMBEDDINGS, _STD, _VIDEO = "classes", "class_id", "embeddings", "box_std", "video"
 #: Identities that another tracker has given: passed over, as they are in tables.
 _PASSED_OVER = ("tracker_id", "track_id")
-_MORE = (_CLASSES, _CLASS_ID, _EMBEDDINGS, CAMERA_MOTION, _VIDEO)
+_MORE = (_CLASSES, _CLASS_ID, _EMBEDDINGS, _STD, CAMERA_MOTION, _VIDEO)
 _KNOWN = frozenset((*_KEYS, *_TIMES, *_MORE, *_PASSED_OVER))
 
 
@@ -44,9 +44,10 @@ def read_batches(
     """Read scans as their lines arrive.
 
     A line of JSON is one scan, `{"t": 0.05, "sensor": "rgb", "boxes": [[l, t, w, h], …], "scores": [s, …]}`,
-    or a list of scans of one time. Without `scores` each is 1; `classes` (names or numbers), `class_id` and
-    `embeddings` may follow, and `camera_motion` of the scan. It is given out at once; with `joint` only when
-    a later time is seen, so that scans of one time that came in lines of their own are given out together.
+    or a list of scans of one time. Without `scores` each is 1; `classes` (names or numbers), `class_id`,
+    `embeddings` and `box_std` may follow, and `camera_motion` of the scan. It is given out at once; with
+    `joint` only when a later time is seen, so that scans of one time that came in lines of their own are
+    given out together.
 
     CSV begins with a header and has one row a detection; a row with only `t` and `sensor` is a scan that
     found nothing. Columns and times are as in files (`column_names`). Rows of one time are given out
@@ -176,7 +177,8 @@ def _scan_of(item: Any, how: StreamReading) -> tuple[Scan, int] | None:
     if scores is None:
         scores = np.ones(len(boxes) if hasattr(boxes, "__len__") else 0)
     vectors = _with_blanks(item.get(_EMBEDDINGS))
-    return how.scan(t, sensor, boxes, scores, _classes_of(item), vectors, item.get(CAMERA_MOTION))
+    motion, std = item.get(CAMERA_MOTION), _std_of(item)
+    return how.scan(t, sensor, boxes, scores, _classes_of(item), vectors, motion, std)
 
 
 def _classes_of(item: dict[Any, Any]) -> dict[str, TextArray]:
@@ -194,6 +196,21 @@ def _classes_of(item: dict[Any, Any]) -> dict[str, TextArray]:
             raise DataError(f"{key} must be a list of names or numbers, one a box, got {values!r:.80}")
         found[column] = np.array(["" if one is None else str(one) for one in values], dtype=np.str_)
     return found
+
+
+def _std_of(item: dict[Any, Any]) -> Any:
+    """Standard deviations of the sides of boxes, with NaN in place of null, for a box or for a side."""
+    found = item.get(_STD)
+    if not isinstance(found, list):
+        return found
+    return [
+        [math.nan] * 4
+        if one is None
+        else [math.nan if side is None else side for side in one]
+        if isinstance(one, list)
+        else one
+        for one in found
+    ]
 
 
 def _is_class(value: Any) -> bool:

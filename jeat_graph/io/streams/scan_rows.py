@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import TextArray
+from jeat_graph.data.box_std import STD_COLUMNS
 from jeat_graph.data.box_text import KNOWN, sides_of
 from jeat_graph.data.camera_motion import CAMERA_MOTION
 from jeat_graph.data.class_columns import CLASS_COLUMNS
@@ -33,7 +34,7 @@ from jeat_graph.io.streams.stream_text import decode_line
 from jeat_graph.io.tables.headers import delimiter_of
 
 _COLUMNS = ("t", "sensor", *BOX)
-_OPTIONAL = ("score", "embedding", CAMERA_MOTION, *ASIDE)
+_OPTIONAL = ("score", *STD_COLUMNS, "embedding", CAMERA_MOTION, *ASIDE)
 _CORNERS = ("left", "top", "right", "bottom")
 
 
@@ -45,6 +46,7 @@ class _Row(NamedTuple):
     kinds: dict[str, str]
     embedding: list[float] | None
     motion: list[float] | None
+    std: list[float] | None
     flat: int
 
 
@@ -174,7 +176,18 @@ def _row_of(value: dict[str, str], form: CsvForm, how: StreamReading) -> _Row | 
     embedding = [_number("embedding", word, comma) for word in words] if words and box is not None else None
     motion = [_number(CAMERA_MOTION, word, comma) for word in value.get(CAMERA_MOTION, "").split()] or None
     kinds = {name: value[name] for name in CLASS_COLUMNS if name in value}
-    return _Row(t, sensor, box, score, kinds, embedding, motion, 0)
+    return _Row(t, sensor, box, score, kinds, embedding, motion, _std_of(value, comma), 0)
+
+
+def _std_of(value: dict[str, str], comma: bool) -> list[float] | None:
+    """Standard deviations of the sides (px) of a row, NaN where one is blank; None where it says none."""
+    if not any(value.get(column) for column in STD_COLUMNS):
+        return None
+    texts = [value.get(column, "") for column in STD_COLUMNS]
+    return [
+        _number(column, text, comma) if text else np.nan
+        for column, text in zip(STD_COLUMNS, texts, strict=True)
+    ]
 
 
 def _box_of(value: dict[str, str], form: CsvForm, comma: bool) -> list[float]:
@@ -208,5 +221,7 @@ def _scan_of_rows(rows: list[_Row], line: int, how: StreamReading) -> ScanBatch:
         [[np.nan] * numbers if row.embedding is None else row.embedding for row in found] if numbers else None
     )
     motion = next((row.motion for row in rows if row.motion is not None), None)
-    scan, flat = how.scan(rows[0].t, rows[0].sensor, boxes, scores, kinds, embeddings, motion)
+    known = any(row.std is not None for row in found)
+    std = [[np.nan] * 4 if row.std is None else row.std for row in found] if known else None
+    scan, flat = how.scan(rows[0].t, rows[0].sensor, boxes, scores, kinds, embeddings, motion, std)
     return ScanBatch([scan], [line], flat + sum(row.flat for row in rows))

@@ -113,6 +113,7 @@ class StreamReading:
         columns: Mapping[str, TextArray],
         embeddings: npt.ArrayLike | None = None,
         camera_motion: npt.ArrayLike | None = None,
+        box_std: npt.ArrayLike | None = None,
     ) -> tuple[Scan, int]:
         """Make a scan of what its lines say.
 
@@ -124,6 +125,7 @@ class StreamReading:
             columns: (M,) classes by the name of their column, of `class_columns.CLASS_COLUMNS`.
             embeddings: (M, E), or None.
             camera_motion: (11,), or None.
+            box_std: (M, 4), or None.
 
         Returns:
             The scan, and how many boxes without area were left out of it.
@@ -135,7 +137,8 @@ class StreamReading:
         if self.how.score_scale != "unit":
             scores = scale_scores(np.asarray(scores, dtype=np.float64), self.how.score_scale, "")
         try:
-            found, flat = scan_with_area(t, sensor, boxes, scores, classes, embeddings, camera_motion)
+            more = embeddings, camera_motion, box_std
+            found, flat = scan_with_area(t, sensor, boxes, scores, classes, *more)
         except DataError as error:
             place, wrong, rest = error.message.partition(_SCORE_IS_WRONG)
             score = _number(rest.rpartition("got ")[2]) if wrong else None
@@ -169,6 +172,7 @@ class StreamReading:
             scores=scan.scores[keep],
             classes=scan.classes[keep],
             embeddings=vectors,
+            box_std=None if scan.box_std is None else scan.box_std[keep],
         )
 
     def _time_of_text(self, column: str, text: str) -> float:

@@ -10,6 +10,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from jeat_graph.data.box_std import STD_COLUMNS
 from jeat_graph.data.class_columns import LISTS_COUNT_FROM
 from jeat_graph.data.column_names import BOX, DEFAULT_SENSOR, NUMBER_COLUMNS
 from jeat_graph.data.detections import Detections
@@ -33,7 +34,7 @@ from jeat_graph.io.tables.table_writer import write_columns
 
 _COLUMNS = ("t", "sensor", *BOX, "score")
 _KINDS = {
-    **dict.fromkeys((*NUMBER_COLUMNS, "score"), NUMBER),
+    **dict.fromkeys((*NUMBER_COLUMNS, "score", *STD_COLUMNS), NUMBER),
     **dict.fromkeys(("sensor", *ASIDE), WORD),
 }
 
@@ -110,7 +111,8 @@ def read_detections_counted(
             path,
         )
     scores = np.ones(len(rows.t)) if rows.scores is None else scale_scores(rows.scores, how.score_scale, path)
-    return assemble(rows.t, name, rows.boxes, scores, rows.classes, missing, rows.error), rows.frames
+    found = rows.boxes, scores, rows.classes, missing, rows.error, rows.box_std
+    return assemble(rows.t, name, *found), rows.frames
 
 
 def read_many(paths: Sequence[str | Path], **options: Any) -> Detections:
@@ -228,7 +230,8 @@ def write_detections(
     if declared:
         columns |= columns_of(declared, columns["sensor"])
     if decimals is not None:
-        columns |= {name: round_decimals(columns[name], decimals) for name in BOX}
+        rounded = [name for name in (*BOX, *STD_COLUMNS) if name in columns]
+        columns |= {name: round_decimals(columns[name], decimals) for name in rounded}
     write_columns(columns, path)
 
 

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.box_std import join_std
 from jeat_graph.data.corrected_tracks import CorrectedTracks, Disagreements
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.scan import trusted_scan
@@ -145,6 +146,7 @@ def edited(
                 classes,
                 embeddings,
                 scan.camera_motion,
+                join_std([scan.box_std, None], [len(own), len(new)]) if scan.box_std is not None else None,
             )
         )
         owners.append(np.concatenate([owner[own], code[new]]))

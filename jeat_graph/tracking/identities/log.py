@@ -108,8 +108,9 @@ def _where(scan: Scan, keep: BoolArray) -> Scan:
     """Return a scan with the boxes (M,) that a mask says."""
     classes = None if scan.classes is None else scan.classes[keep]
     embeddings = None if scan.embeddings is None else scan.embeddings[keep]
-    boxes, scores = scan.boxes[keep], scan.scores[keep]
-    return trusted_scan(scan.t, scan.sensor, boxes, scores, classes, embeddings, scan.camera_motion)
+    box_std = None if scan.box_std is None else scan.box_std[keep]
+    found = scan.boxes[keep], scan.scores[keep], classes, embeddings
+    return trusted_scan(scan.t, scan.sensor, *found, scan.camera_motion, box_std)
 
 
 def _rows(detections: Detections) -> tuple[Any, Any]:

@@ -67,15 +67,20 @@ def ints(values: Any, length: int | None = None, *, least: int = 0, most: int = 
     return np.asarray(values)
 
 
-def floats(values: Any, *shape: int, infinite: bool = False) -> FloatArray:
+def floats(values: Any, *shape: int, infinite: bool = False, unknown: bool = False) -> FloatArray:
     """Return numbers that were read, of a shape; any length where the first of it is below 0.
+
+    They are finite, but for those that may be infinite, or not be known (NaN).
 
     Raises:
         DataError: they are none, or not finite where they must be.
     """
     good = isinstance(values, np.ndarray) and values.dtype == np.float64 and values.ndim == len(shape)
     good = good and values.shape == (len(values) if shape[0] < 0 else shape[0], *shape[1:])
-    if not good or not (~np.isnan(values) if infinite else np.isfinite(values)).all():
+    if (
+        not good
+        or not (np.isfinite(values) | (infinite & np.isinf(values)) | (unknown & np.isnan(values))).all()
+    ):
         raise damaged("numbers")
     return np.asarray(values)
 

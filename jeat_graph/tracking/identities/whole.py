@@ -12,7 +12,7 @@ from jeat_graph.data.detections import Detections
 from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.data.progress import pieces_in_span, progress_span
 from jeat_graph.data.trajectories import Trajectories
-from jeat_graph.filters import box_sides, sensor_offsets
+from jeat_graph.filters import box_sides, box_spread, sensor_offsets
 from jeat_graph.smoothers.joining import LearntScene, MeasuredBoxes
 from jeat_graph.tracking.engine import lacking
 from jeat_graph.tracking.identities.deciding import IdentityDecision, Recording, decide
@@ -78,12 +78,18 @@ def _recording(tracker: ModelTracker, detections: Detections, camera: FloatArray
     )
     t = np.repeat(detections.scan_t, count)
     times, at = np.unique(detections.scan_t, return_inverse=True)
-    measured, scene = measured_boxes(tracker, t, sensor, boxes, camera[np.repeat(at, count)])
+    of_row = camera[np.repeat(at, count)]
+    measured, scene = measured_boxes(tracker, t, sensor, boxes, of_row, detections.box_std)
     return Recording(measured, times, scene, detections.embeddings)
 
 
 def measured_boxes(
-    tracker: ModelTracker, t: FloatArray, sensor: IntArray, boxes: FloatArray, camera: FloatArray
+    tracker: ModelTracker,
+    t: FloatArray,
+    sensor: IntArray,
+    boxes: FloatArray,
+    camera: FloatArray,
+    box_std: FloatArray | None,
 ) -> tuple[MeasuredBoxes, LearntScene]:
     """Return detections as the model sees them, by what it has learnt so far, and that.
 
@@ -93,6 +99,7 @@ def measured_boxes(
         sensor: (N,) as the tracker counts them.
         boxes: (N, 4) left, top, right, bottom in the common picture (px).
         camera: (N, 2) how far the camera's motion had taken what is at rest (px).
+        box_std: (N, 4) standard deviations of these by the detector (px), NaN where unknown; or None.
     """
     model, c = tracker._model, tracker.constants
     if not isinstance(model, OneModel):
@@ -102,6 +109,11 @@ def measured_boxes(
     ends = learnt.boxes_at_edge >= learnt.boxes_beyond
     known = tracker.config.input.picture == "given"
     edges = box_sides.at_edge(boxes, picture, c) & (ends & known)[sensor][:, None, None]
+    spread = None
+    if box_std is not None:
+        size = boxes[:, 2:] - boxes[:, :2]
+        own = box_spread.squares(box_std, size, c) * (box_spread.scale(size) ** 2)[..., None]
+        spread = learnt.spread_gain[sensor][:, None, None] * own
     boxes = boxes.copy()
     for k in range(len(tracker.engine_sensors)):
         own = sensor == k
@@ -111,5 +123,6 @@ def measured_boxes(
         learnt.log_side_variance,
         learnt.log_scene_variance,
         picture,
+        learnt.log_own_variance,
     )
-    return MeasuredBoxes(t, sensor, boxes, edges, camera), scene
+    return MeasuredBoxes(t, sensor, boxes, edges, camera, spread), scene

@@ -22,6 +22,7 @@ class WindowRows(NamedTuple):
         odds: (N,) log odds that this track is real then: of the causal pass, once decided of both.
         owner: (N,) identity that was decided, 0 for nobody's, -1 before it is.
         camera: (N, 2) how far the camera's motion had taken what is at rest (px).
+        box_std: (N, 4) standard deviations of the sides by the detector (px), NaN where unknown.
     """
 
     number: IntArray
@@ -32,6 +33,7 @@ class WindowRows(NamedTuple):
     odds: FloatArray
     owner: IntArray
     camera: FloatArray
+    box_std: FloatArray
 
     def take(self, rows: IntArray | BoolArray) -> WindowRows:
         """Return some of them."""
@@ -44,6 +46,7 @@ class WindowRows(NamedTuple):
             self.odds[rows],
             self.owner[rows],
             self.camera[rows],
+            self.box_std[rows],
         )
 
     @classmethod
@@ -71,9 +74,11 @@ class WindowRows(NamedTuple):
             floats(state["odds"], count),
             ints(state["owner"], count, least=1),
             floats(state["camera"], count, 2),
+            floats(state["box_std"], count, 4, unknown=True),
         )
         sound = (
             (rows.boxes[:, 2:] >= rows.boxes[:, :2]).all()
+            and not (rows.box_std < 0.0).any()
             and (np.diff(number) > 0).all()
             and (np.diff(rows.t) >= 0.0).all()
         )
@@ -85,7 +90,8 @@ class WindowRows(NamedTuple):
     def none(cls) -> WindowRows:
         """Return no rows."""
         none = np.zeros(0, dtype=np.int64)
-        return cls(none, np.zeros(0), none, np.zeros((0, 4)), none, np.zeros(0), none, np.zeros((0, 2)))
+        sides, camera = np.zeros((0, 4)), np.zeros((0, 2))
+        return cls(none, np.zeros(0), none, sides, none, np.zeros(0), none, camera, sides)
 
 
 def continuing(rows: WindowRows, assigned: IntArray) -> IntArray:

@@ -19,6 +19,7 @@ import numpy as np
 from jeat_graph.association import agreement
 from jeat_graph.association.linking import TERMS, Past
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
+from jeat_graph.data.box_std import join_std, known_std
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.identity_links import IdentityLinks
 from jeat_graph.tracking.identities import deciding, saved_parts
@@ -256,6 +257,7 @@ class LagDecider:
             size = [len(scan) for scan in step.batch]
             boxes = np.concatenate([scan.boxes for scan in step.batch])
             count = len(boxes)
+            std = join_std([scan.box_std for scan in step.batch], size)
             parts.append(
                 WindowRows(
                     np.arange(step.first, step.first + count),
@@ -266,6 +268,7 @@ class LagDecider:
                     deciding.log_odds(step.taken.real),
                     np.full(count, -1, dtype=np.int64),
                     np.broadcast_to(step.camera, (count, 2)),
+                    np.full((count, 4), np.nan) if std is None else std,
                 )
             )
         rows = WindowRows(*(np.concatenate(columns) for columns in zip(self._kept, *parts, strict=True)))
@@ -280,7 +283,8 @@ class LagDecider:
     def _choose(self, tracker: ModelTracker, rows: WindowRows, back: IntArray, later: FloatArray) -> _Choice:
         """Return the best chains of what is in the window; what is decided stays as it is."""
         c = tracker.constants
-        seen, scene = measured_boxes(tracker, rows.t, rows.sensor, rows.boxes, rows.camera)
+        std = known_std(rows.box_std)
+        seen, scene = measured_boxes(tracker, rows.t, rows.sensor, rows.boxes, rows.camera, std)
         assigned = np.stack([continuing(rows, rows.causal), continuing(rows, back)])
         piece = agreement.pieces(agreement.SeenBoxes(rows.t, rows.sensor), assigned, deciding.AGREED)
         piece = one_piece_an_identity(piece, rows.owner)
