@@ -8,8 +8,7 @@ window of two lags is smoothed and its older half is given out. So memory does n
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +19,7 @@ from jeat_graph.filters.gap_survival import GapCounts
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.filtered_track import FilteredTrack, smoothed_together
 from jeat_graph.smoothers.gap_ends import known_around, whole_gaps
+from jeat_graph.smoothers.history import History, TrackUpdate, UpdateColumns, update_columns, updates_of
 from jeat_graph.smoothers.rows import Called, ModelRows, RowOutput, joined, rows_of
 from jeat_graph.smoothers.state_rts import FilterRecord
 
@@ -133,60 +133,6 @@ class RtsSolver:
         return {}
 
 
-class TrackUpdate(NamedTuple):
-    """One update of one track: of `FilterRecord` and, where it is the last of its step, of `StepRecord`."""
-
-    t: float
-    F: FloatArray
-    predicted_mean: FloatArray
-    predicted_covariance: FloatArray
-    mean: FloatArray
-    covariance: FloatArray
-    sensor: int
-    real: float
-    used: int
-    confirmed: bool
-    missed: float
-    later: float
-    last_of_step: bool
-
-
-@dataclass
-class History:
-    """The updates of one living track that are not final.
-
-    Attributes:
-        track_id: identity.
-        called: in the rows.
-        missed: what had been missed by the last entry that was given out; below 0 before the first.
-        later: what was known by later of the last detection that was given out; below 0 for nothing.
-        was_real: whether it was likelier real than not at any entry that was given out.
-        entries: the updates.
-    """
-
-    track_id: int
-    called: Called
-    missed: float = -1.0
-    later: float = -1.0
-    was_real: bool = False
-    entries: list[TrackUpdate] = field(default_factory=list)
-
-    def window(self) -> FilteredTrack:
-        """Return its entries as columns."""
-        e = self.entries
-        shape = e[0].covariance.shape
-        return FilteredTrack(
-            self.track_id,
-            np.array([one.t for one in e]),
-            np.stack([np.broadcast_to(one.F, shape) for one in e]),
-            np.stack([one.predicted_mean for one in e]),
-            np.stack([one.predicted_covariance for one in e]),
-            np.stack([one.mean for one in e]),
-            np.stack([one.covariance for one in e]),
-            np.array([one.sensor for one in e], dtype=np.int64),
-        )
-
-
 class Histories:
     """Takes steps in, in order of time, and gives smoothed rows out.
 
@@ -246,7 +192,7 @@ class Histories:
             [one.window() for one in wanted], [len(one.entries) for one in wanted], False
         )
         parts = [
-            self._rows_of(one, math.inf, self._gaps, states)[0]
+            self._rows_of(one, one.columns(), len(one.entries), self._gaps, states)
             for one, states in zip(wanted, found, strict=True)
         ]
         return joined([*self._rows, *parts])
@@ -261,6 +207,16 @@ class Histories:
         """End all tracks and return all rows that are not drained."""
         self.end_all()
         return self.drain()
+
+    def forget(self, until: Mapping[int, float]) -> None:
+        """Forget updates of living tracks, by identity those up to a time (s): nobody wants their rows."""
+        for one in self._living:
+            limit = until.get(one.track_id, -math.inf)
+            if one.entries and one.entries[0].t <= limit:
+                columns = one.columns()
+                count = int(np.searchsorted(columns.t, limit, side="right"))
+                one.forget(columns, count, self._existence.constants.report)
+                self._solver.end(one.track_id)  # it begins again with a filtered state
 
     def settle(self) -> None:
         """Forget what can be made again: what follows is as of one that was saved and loaded."""
@@ -279,7 +235,7 @@ class Histories:
             "later": np.array([one.later for one in self._living]),
             "was_real": np.array([one.was_real for one in self._living], dtype=np.bool_),
             "track_id": np.array([one.track_id for one in self._living], dtype=np.int64),
-            "entries": [_columns(one.entries) for one in self._living],
+            "entries": [update_columns(one.entries) for one in self._living],
         }
 
     def set_state(self, state: dict[str, Any]) -> None:
@@ -292,7 +248,7 @@ class Histories:
             missed, ids = state["missed"].tolist(), state["track_id"].tolist()
             later, was_real = state["later"].tolist(), state["was_real"].tolist()
             called = [Called(int(given), int(label), float(share)) for given, label, share in state["called"]]
-            entries = [_entries(one) for one in state["entries"]]
+            entries = [updates_of(one) for one in state["entries"]]
             living = [
                 History(int(track), name, float(number), float(known), bool(real), updates)
                 for track, name, number, known, real, updates in zip(
@@ -321,14 +277,12 @@ class Histories:
         ]
         if not ready:
             return
-        counts = [sum(entry.t <= now - self._lag_s for entry in one.entries) for one in ready]
+        columns = [one.columns() for one in ready]
+        counts = [int(np.searchsorted(one.t, now - self._lag_s, side="right")) for one in columns]
         found = self._solver.smoothed([one.window() for one in ready], counts, True)
-        for one, states in zip(ready, found, strict=True):
-            rows, count, one.missed, one.later = self._rows_of(one, now - self._lag_s, gaps, states)
-            self._rows.append(rows)
-            report = self._existence.constants.report
-            one.was_real |= any(entry.last_of_step and entry.real > report for entry in one.entries[:count])
-            del one.entries[:count]
+        for one, told, count, states in zip(ready, columns, counts, found, strict=True):
+            self._rows.append(self._rows_of(one, told, count, gaps, states))
+            one.forget(told, count, self._existence.constants.report)
             self._solver.leave(one.track_id, count)
 
     def _is_decided(self, history: History) -> bool:
@@ -351,16 +305,21 @@ class Histories:
         whole = [(one, gaps) for one, gaps in self._ended if one.entries]
         counts = [len(one.entries) for one, _ in whole]
         found = self._solver.smoothed([one.window() for one, _ in whole], counts, True)
-        for (one, gaps), states in zip(whole, found, strict=True):
-            self._rows.append(self._rows_of(one, math.inf, gaps, states)[0])
+        for (one, gaps), count, states in zip(whole, counts, found, strict=True):
+            self._rows.append(self._rows_of(one, one.columns(), count, gaps, states))
         for one, _ in self._ended:
             self._solver.end(one.track_id)
         self._ended = []
 
     def _rows_of(
-        self, history: History, until: float, gaps: GapCounts, states: tuple[FloatArray, FloatArray]
-    ) -> tuple[ModelRows, int, float, float]:
-        """Return a window's rows until a time (s), how many entries these are, and the last one's `History`.
+        self,
+        history: History,
+        columns: UpdateColumns,
+        count: int,
+        gaps: GapCounts,
+        states: tuple[FloatArray, FloatArray],
+    ) -> ModelRows:
+        """Return the rows of the first updates of a window, by all that it tells.
 
         A row's existence is the track's posterior at that time, or where it turned out to be real for sure,
         what it turned out to be, times the probability that it had been so for as long as it took to turn
@@ -369,29 +328,19 @@ class Histories:
         ends ends well. What comes later may say less of the detections around a row than what it turned
         out to be.
         """
-        c, e = self._existence.constants, history.entries
-        t = np.array([one.t for one in e])
-        real, missed = np.array([one.real for one in e]), np.array([one.missed for one in e])
-        used, later = np.array([one.used for one in e], dtype=np.int64), np.array([one.later for one in e])
-        confirmed, last = np.array([one.confirmed for one in e]), np.array([one.last_of_step for one in e])
-        same = np.flatnonzero(t[1:] == t[:-1])
-        for k in same.tolist():  # of one time the last one tells what all of them found
-            used[k + 1] |= used[k]
-            confirmed[k + 1] |= confirmed[k]
-            missed[k + 1] *= not confirmed[k + 1]
-            later[k + 1] = max(later[k + 1], later[k])
+        c = self._existence.constants
+        t, real, used, later, confirmed, missed, last, same = columns
         seen = np.flatnonzero(confirmed & last)
         final = float(real[seen[-1]]) if len(seen) else 0.0
         if self._existence.of_any_time:
             final = float(real.max())
-        count = int(np.searchsorted(t, until, side="right"))
         gap, before = whole_gaps(confirmed, missed, last), max(history.missed, 0.0)
         settled = np.flatnonzero(last[:count])
         nearer = np.minimum(missed[settled], gap[settled] - np.concatenate([[before], missed[settled]])[:-1])
         given = settled <= (seen[-1] if len(seen) else -1)
         given &= ~np.isin(settled, same)  # a later step of the same time tells more
         rows = settled[given]
-        around, known = known_around(later, last, history.later, count)
+        around, _ = known_around(later, last, history.later, count)
         turned = np.minimum(final, around[rows])
         found = np.flatnonzero(real > c.report)
         if not self._existence.of_any_time and not history.was_real and len(found):
@@ -400,7 +349,7 @@ class Histories:
         is_real = is_real * gap_survival.survival(gaps, nearer[given], c)
         shown = is_real > c.report
         rows, is_real = rows[shown], is_real[shown]
-        table = rows_of(
+        return rows_of(
             t[rows],
             [history.called] * len(rows),
             (states[0][rows], states[1][rows]),
@@ -408,7 +357,6 @@ class Histories:
             used[rows],
             self._output,
         )
-        return table, count, float(missed[settled[-1]]) if len(settled) else before, known
 
 
 def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> TrackUpdate:
@@ -428,56 +376,6 @@ def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> Trac
         later=float(record.later[row]) if last and record.later is not None else -1.0,
         last_of_step=last,
     )
-
-
-def _columns(entries: Sequence[TrackUpdate]) -> list[FloatArray]:
-    """Return updates as arrays (K, ...), one for each attribute."""
-    return (
-        [
-            np.stack([np.asarray(one[k], dtype=np.float64) for one in entries])
-            for k in range(len(TrackUpdate._fields))
-        ]
-        if entries
-        else []
-    )
-
-
-def _entries(columns: Sequence[FloatArray]) -> list[TrackUpdate]:
-    """Return what `_columns` made arrays of.
-
-    Raises:
-        ValueError: they are no updates.
-    """
-    if not len(columns):
-        return []
-    if len({len(one) for one in columns}) != 1 or not all(np.isfinite(one).all() for one in columns):
-        raise ValueError("its updates are none")
-    made = []
-    for t, F, before, before_cov, mean, covariance, *rest in zip(*columns, strict=True):
-        sensor, real, used, confirmed, missed, later, last = (float(one) for one in rest)
-        size = mean.shape[-1] if mean.ndim == 2 else -1
-        square = (len(mean), size, size)
-        shapes = {before_cov.shape, covariance.shape}
-        if before.shape != mean.shape or F.shape != (1, size, size) or shapes != {square}:
-            raise ValueError("its updates are none")
-        made.append(
-            TrackUpdate(
-                t=float(t),
-                F=F,
-                predicted_mean=before,
-                predicted_covariance=before_cov,
-                mean=mean,
-                covariance=covariance,
-                sensor=int(sensor),
-                real=real,
-                used=int(used),
-                confirmed=bool(confirmed),
-                missed=missed,
-                later=later,
-                last_of_step=bool(last),
-            )
-        )
-    return made
 
 
 def _share_of(history: History) -> float:

@@ -227,6 +227,13 @@ class CoreModel(OneModel):
         own = None if record is None else _own_record(record)
         self._model.hand_over(own, given, label, share)
 
+    def forget(self, track_id: IntArray, until: FloatArray) -> None:
+        """Have no smoothed rows of tracks up to a time each."""
+        if self._histories is None:
+            self._model.forget(track_id, until)
+        else:
+            super().forget(track_id, until)
+
     def smoothed(self) -> ModelRows:
         """Return the smoothed rows so far."""
         return self._model.smoothed() if self._histories is None else super().smoothed()

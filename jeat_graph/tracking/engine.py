@@ -263,6 +263,14 @@ class TrackEngine(Protocol):
             share: (N,) share of the votes that speak for it.
         """
 
+    def forget(self, track_id: IntArray, until: FloatArray) -> None:
+        """Have no smoothed rows of living tracks up to a time each, so that their states need not be kept.
+
+        Args:
+            track_id: (K,) the tracks, ascending.
+            until: (K,) the times (s).
+        """
+
     def smoothed(self) -> ModelRows:
         """Return the smoothed rows so far, without what was drained."""
         ...

@@ -85,6 +85,10 @@ class SmoothsRecords:
         shares = [0.0] * len(ids) if share is None else share.tolist()
         self._histories.take(step, [Called(*one) for one in zip(names, labels, shares, strict=True)])
 
+    def forget(self, track_id: IntArray, until: FloatArray) -> None:
+        """Have no smoothed rows of tracks up to a time each; see `TrackEngine.forget`."""
+        self._wanted().forget(dict(zip(track_id.tolist(), until.tolist(), strict=True)))
+
     def smoothed(self) -> ModelRows:
         """Return the smoothed rows so far, without what was drained."""
         return self._wanted().preview()

@@ -179,6 +179,43 @@ def test_the_cores_smoother_is_the_one_in_numpy_over_its_records(seed, motions, 
     np.testing.assert_allclose(found[4], wanted[4], rtol=1e-12)
 
 
+@settings(max_examples=6, deadline=None)
+@given(seed=st.integers(0, 10**6), lag=st.sampled_from([math.inf, 0.4]))
+def test_states_that_are_forgotten_change_no_row_behind_them(seed, lag):
+    """In the core and in NumPy."""
+    rng, c = np.random.default_rng(seed), ModelConstants()
+    smoother = "engine=full" if math.isinf(lag) else f"engine=fixed-lag lag_s={lag}"
+    core, whole = models(smoother, True)[0], models(smoother, True)[0]
+    ours, until, told = Histories(lag, Existence(c), row_output(c)), {}, []
+    for _ in range(2):
+        declare(core)
+        declare(whole)
+    for scan in drawn_stream(seed, 2, 40):
+        for model in (core, whole):
+            model.take(looked(*scan))
+        record = core.record()
+        step = core.step_record(record)
+        ours.take(step, [Called(track) for track in step.track_id.tolist()])
+        core.hand_over(record)
+        whole.hand_over()
+        if rng.random() < 0.3:
+            some = [k for k in core.identities().tolist() if rng.random() < 0.4 and k not in until]
+            t = step.t - rng.uniform(0.0, 0.5)
+            until |= dict.fromkeys(some, t)
+            told.append(len(some))
+            core.forget(np.array(some, dtype=np.int64), np.full(len(some), t))
+            ours.forget(dict.fromkeys(some, t))
+    found, numpy, wanted = (in_order(one.finish()) for one in (core, ours, whole))
+    assert sum(told) > 3
+    for k in (0, 1, 5, 6, 7):
+        np.testing.assert_array_equal(numpy[k], found[k])
+    np.testing.assert_allclose((numpy[2] - found[2]) / np.sqrt(found[3]), 0.0, atol=1e-9)
+    if math.isinf(lag):  # else a window begins where its track's states do, and so ends later
+        limit = np.array([until.get(track, -math.inf) for track in wanted[1].tolist()])
+        for one, other in zip(found, wanted, strict=True):
+            np.testing.assert_array_equal(one, other[wanted[0] > limit])
+
+
 def sorted_rows(rows):
     order = np.lexsort((rows[1], rows[0]))
     return [column[order] for column in rows]

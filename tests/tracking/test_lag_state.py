@@ -179,6 +179,18 @@ def test_what_is_saved_does_not_grow_with_time():
     assert max(sizes[40:]) <= 1.05 * max(sizes[:40])
 
 
+def test_the_second_smoother_keeps_the_states_of_rows_that_it_may_give_alone():
+    """An identity that is one causal track has them since its last detection."""
+    tracker = Tracker(config())
+    for scan in scene(1, seconds=HIDDEN_S[0]):
+        tracker.step(scan)
+    state = tracker.state()
+    models = state["model"], state["lag"]["follower"]["state"]["model"]
+    entries = [len(model["histories.t"]) for model in models]
+    assert len(models[1]["histories.track_id"]) == 3
+    assert entries[1] < 0.1 * entries[0]
+
+
 # What is damaged.
 
 

@@ -72,6 +72,20 @@ public:
         living_.resize(to);
     }
 
+    // Forget updates of living tracks, of those with these ascending identities up to a time each: nobody wants their
+    // rows.
+    void forget(std::span<const std::int64_t> track_id, std::span<const double> until, const GapCounts& gaps,
+                const ModelConstants& c) {
+        std::size_t k = 0;
+        for (History& history : living_) {
+            while (k < track_id.size() && track_id[k] < history.track_id) ++k;
+            if (k == track_id.size()) return;
+            if (track_id[k] != history.track_id || history.entries.empty()) continue;
+            if (history.entries.front().t <= until[k])
+                forget_first(history, window_.weigh(history, until[k], gaps, c), c);
+        }
+    }
+
     // Rows of living tracks as of now; they stay.
     Rows preview(const GapCounts& gaps, const ModelConstants& c) {
         Rows out = rows_;

@@ -227,6 +227,11 @@ public:
         histories_.take(chosen, called_, now_.state.constants);
     }
 
+    void forget(In<std::int64_t> track_id, In<double> until) {
+        check_lengths({track_id.size(), until.size()});
+        histories_.forget(span(track_id), span(until), now_.state.gaps, now_.state.constants);
+    }
+
     void reset(double t) {
         check(std::isfinite(t), "no such time");
         tracking::reset(now_.state, t);
@@ -295,7 +300,6 @@ public:
         }();
         return table(rows);
     }
-    std::size_t waiting() { return histories_.rows().size(); }
     Table drain() {
         Table out = table(histories_.rows());
         histories_.rows().clear();
@@ -474,6 +478,8 @@ void bind(nb::module_& module) {
              nb::arg("share").noconvert() = nb::none(),
              "Tell the smoother of a step (of the last one without a record), in order of time: the identity given out\n"
              "for each of its tracks (N,), the number of its class, below 0 for none, and the share of its votes.")
+        .def("forget", exclusive(&Model::forget), nb::arg("track_id").noconvert(), nb::arg("until").noconvert(),
+             "Have no smoothed rows of tracks, by ascending identities (K,), up to a time (K,) each (s).")
         .def("reset", exclusive(&Model::reset), nb::arg("t"),
              "End all tracks and go on from another time (s), as if none had passed; what was learnt stays.")
         .def("snapshot", exclusive(&Model::snapshot), "A copy of all that the next step depends on.")
@@ -500,7 +506,6 @@ void bind(nb::module_& module) {
                  return new Model(model);
              },
              nb::arg("memo"), "A model of its own in the same state.")
-        .def("waiting", exclusive(&Model::waiting), "Number of smoothed rows that have become final.")
         .def("assigned", exclusive(&Model::assigned), "Identity of the track that each box of the last step was assigned to (M,).")
         .def("living", exclusive(&Model::living), "Identities of the tracks of the last step, before any ended (N,).")
         .def("size", exclusive(&Model::size), "Number of living tracks.")

@@ -3,7 +3,7 @@
 Rows come from two smoothers: that of the causal tracker, for identities that are one causal track and all of
 it, and that of a second tracker that follows what was decided, for the others. An identity goes over to the
 second for good with the first detection that is not of its one causal track: rows up to the last detection
-before come from the first, those behind it from the second.
+before come from the first, those behind it from the second, which so keeps no states up to there.
 """
 
 from __future__ import annotations
@@ -282,6 +282,8 @@ class LagSmoother:
             for owner, causal in zip(step.owner.tolist(), step.causal.tolist(), strict=True):
                 self._whole.note(owner, causal, step.t)
             self._follow(step, tracker)
+        if steps:
+            self._forget_states()
 
     def _follow(self, step: DecidedStep, tracker: ModelTracker) -> None:
         """Give a step to the second tracker, with who is who."""
@@ -298,6 +300,18 @@ class LagSmoother:
                 label[one] = owner
         self._label = label
         self._follower.hand_over(taken._replace(given=np.array(list(label.values()), dtype=np.int64)))
+
+    def _forget_states(self) -> None:
+        """Have the second smoother keep no states that it gives no rows of, whatever is decided later."""
+        assert self._follower is not None, "it has followed a step"
+        whole = self._whole
+        until = {
+            track: whole.since.get(owner, whole.last[owner])
+            for track, owner in sorted(self._label.items())
+            if owner in whole.last
+        }
+        track_id = np.array(list(until), dtype=np.int64)
+        self._follower._model.forget(track_id, np.array(list(until.values())))
 
     def _rows(self, causal: Trajectories, followed: list[Trajectories], limit: float) -> Trajectories:
         """Return the rows whose identity is decided, with that; the others wait.
