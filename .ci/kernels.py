@@ -27,7 +27,7 @@ def blas_kernels() -> str | None:
 
 
 def usual_blas_kernels() -> str:
-    """Name of the processor that OpenBLAS would work for if it were not told."""
+    """Name of the processor that OpenBLAS would work for if it were not set."""
     others = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
     command = [sys.executable, __file__, "blas"]
     return subprocess.run(command, env=others, capture_output=True, text=True, check=True).stdout.strip()

@@ -1,4 +1,4 @@
-"""What it says that two tracks look alike: learnt from pairs that are decided by all but their looks.
+"""What it says that two tracks look similar: learnt from pairs that are decided by all but their appearance.
 
 The feature of a pair is the cosine x of the two embeddings, each less the mean of its camera's, so that what
 a camera does to all vehicles counts for nothing. Of one vehicle x has mean μ₁ and variance v₁, of two μ₀ and
@@ -7,7 +7,7 @@ v₀. Where a pair is one vehicle with probability p, by everything but x,
     E[x] = μ₀ + p (μ₁ − μ₀),   Var[x] = v₀ + p (v₁ − v₀) + p (1 − p) (μ₁ − μ₀)²,
 
 so regressions on p give all four without bias, however unsure the pairs are. p must not contain x: what is
-alike by chance would confirm itself. The log ratio is that of two normal densities with the variance
+similar by chance would confirm itself. The log ratio is that of two normal densities with the variance
 v = (v₀ + v₁)/2 (Fisher 1936); d′ = (μ₁ − μ₀)/√v, shrunk by its own error (James and Stein 1961), so that
 embeddings that tell nothing count for nothing.
 """
@@ -23,12 +23,12 @@ from jeat_graph.data.arrays import FloatArray
 
 #: The least variance of a cosine.
 _LEAST_VARIANCE = 1e-6
-#: ln of the greatest ratio that looks give a pair: as the tracker has it.
+#: ln of the greatest ratio that appearance gives a pair: as the tracker has it.
 MOST_RATIO = 6.0
 
 
 class AppearanceModel(NamedTuple):
-    """How alike one vehicle looks twice, at two cameras or at one, and how alike two vehicles look.
+    """How similar one vehicle looks twice, at two cameras or at one, and how similar two vehicles look.
 
     Attributes:
         same, other: mean cosine of one vehicle and of two.
@@ -56,7 +56,7 @@ def learn_appearance(cosine: FloatArray, probability: FloatArray) -> AppearanceM
 
     Args:
         cosine: (E,) of each pair, NaN where one has no embedding.
-        probability: (E,) that it is one vehicle, by what is not its looks.
+        probability: (E,) that it is one vehicle, by all but its appearance.
 
     Returns:
         The model; None where nothing can be learnt, or the embeddings tell nothing.

@@ -34,7 +34,7 @@ _AT_ENDS = 2.5
 #: Nats of a link that all passes have made.
 VOTES = 3.0
 #: What a link's gain is made up of: how well the motions fit, the passes that made it, the length of the gap,
-#: that the second piece is not born, that the object of the first does not leave, and that both look alike.
+#: that the second piece is not born, that the object of the first does not leave, and that both look similar.
 TERMS = ("motion", "passes", "gap length", "no birth", "no exit", "appearance")
 
 
@@ -102,7 +102,7 @@ def join(
         possible: links, with ln p(joined)/p(apart) as gains.
         votes: (E,) share of the passes that made each.
         span: first and last time of the recording (s).
-        step_s: time from one look to the next (s).
+        step_s: time from one scan to the next (s).
         past: what was decided before, of other pieces.
         likeness: (E,) ln of the ratio that looks give each; None where nothing is known of looks.
     """
@@ -142,7 +142,7 @@ def gap_density(u: FloatArray, median: float, step_s: float) -> FloatArray:
     Args:
         u: time from the last detection to the next (s).
         median: of the gaps that are longer than a step (s).
-        step_s: time from one look to the next (s).
+        step_s: time from one scan to the next (s).
     """
     beyond = np.maximum(u - step_s, 0.0)
     longer = (1.0 - _NO_GAP) * step_s / median / (1.0 + beyond / median) ** 2

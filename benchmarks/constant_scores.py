@@ -178,7 +178,7 @@ def sampled(counts: FloatArray) -> FloatArray:
 
     Returns:
         Scores (1 + `RESAMPLED`, 3), the first row those of the recordings themselves. Two tables of the same
-        recordings are resampled alike, so that their differences are paired.
+        recordings are resampled in the same way, so that their differences are paired.
     """
     return headline(np.concatenate([counts.sum(axis=0, keepdims=True), _draws(len(counts)) @ counts]))
 

@@ -34,8 +34,8 @@ _HOW = f"""The [constants of the model](../method.md#results) were chosen with t
 This page says how much that matters. All detectors of a set are tracked together, and scores are those of
 `jeat-graph eval`, pooled over the recordings of a set. *The sum* is that of {", ".join(HEADLINE)} in
 per cent, and constants are chosen by the sum of the causal tables. ± is the standard error by a bootstrap
-over the recordings of each set; that of a change is paired, because both tables are drawn alike. For a set
-it is given where there are three recordings or more, and is rough where they are few."""
+over the recordings of each set; that of a change is paired, because both tables are drawn in the same way.
+For a set it is given where there are three recordings or more, and is rough where they are few."""
 _CHOOSING = f"""A chooser sees all sets but one. It judges every single move. Those that gain more than their
 standard error, the best {TRIED} of them at most, are tried one after the other on top of those that were
 taken before, and taken if they gain again. A move multiplies one constant (of a probability: its odds) by

@@ -1,8 +1,9 @@
 """Hours of synthetic input through the live path as fast as they go, and what they cost hour by hour.
 
-All is on (`live/session.py`): late scans are put where they belong, messages that come twice are told, the
-health of the sensors is watched, a smoother with a fixed lag runs behind, its rows are fetched, checkpoints
-are written. A day takes hours: with `--checkpoint` a run that was broken off goes on where it was.
+All is on (`live/session.py`): late scans are put where they belong, messages that come twice are recognised,
+the health of the sensors is watched, a smoother with a fixed lag runs behind, its rows are fetched,
+checkpoints are written. A day takes hours: with `--checkpoint` a run that was broken off goes on where it
+was.
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--hours", type=positive, default=24.0, metavar="H", help="length of the input (24)")
     add("--vehicles", type=counting, default=5, metavar="N", help="vehicles in the picture (5)")
     add("--seed", type=natural, default=1, metavar="N", help="seed of the input (1)")
-    add("--out", metavar="FILE", help="write the periods as JSON, anew after each")
+    add("--out", metavar="FILE", help="write the periods as JSON, again after each")
     add("--checkpoint", metavar="FILE", help="keep the state there, and go on from it where it is")
 
 

@@ -4,7 +4,7 @@ Two choosers see the other sets alone. One begins at the constants as shipped, w
 those were chosen with the left-out set in view. The other begins at random values of the constants that
 matter most, which know nothing of it; a third one begins there and sees the left-out set too, so that the
 difference of both is what seeing it gains. How much of a figure is luck of the last digits of the constants
-is told by points near them.
+is known by points near them.
 """
 
 from __future__ import annotations

@@ -253,7 +253,7 @@ def _joined_s(group: Sequence[JudgedRecording], sensors: Sequence[str]) -> float
 def _nees(
     group: Sequence[JudgedRecording], found: Sequence[Any], row: Row, kind: Any
 ) -> dict[str, float | int]:
-    """Whether what is said of the errors is true: only ours says something."""
+    """Whether the stated errors are true: only ours says something."""
     from jeat_graph.eval.position_nees import position_nees
 
     if row.tracker in (BYTETRACK, PAPER):

@@ -85,7 +85,7 @@ def read_openlabel(folder: Path) -> GroundTruth:
 
     Raises:
         DataError: a file that is not OpenLABEL, says no time, or holds a box that is none; or keys that count
-            from 0 anew in each file, by which no object can be followed.
+            from 0 again in each file, by which no object can be followed.
     """
     frames: list[float] = []
     rows: list[tuple[float, str, list[float], str]] = []

@@ -35,7 +35,7 @@ _WHOLE = "whole track"
 # The same by GTSAM, as `smoother.engine` calls it.
 _GTSAM = "gtsam-full"
 _UNITS = "px, px/s, px/s²"
-# What can be said of an estimator by true places alone.
+# What true places alone show of an estimator.
 _OF_PLACES = ("estimator", "position", "position/filter", "ANEES position")
 
 

@@ -141,7 +141,7 @@ def observed_s(begin: float, end: float, span: tuple[float, float]) -> float:
     return max(min(end, span[1]) - max(begin, span[0]), 0.0)
 
 
-#: Of less time than this (s) no flow an hour is told: one vehicle more or less would be 360 an hour.
+#: Of less time than this (s) no flow an hour is given: one vehicle more or less would be 360 an hour.
 LEAST_FLOW_S = 10.0
 _S_PER_HOUR = 3600.0
 

@@ -309,7 +309,7 @@ def _read_truth(path: Path, how: Reading) -> tuple[GroundTruth, FrameCount | Non
 def counted_as_run(
     truth: GroundTruth, run: FrameCount | None, decided: FrameCount | None, rate_hz: float
 ) -> GroundTruth:
-    """Move a truth to the clock of a run that was tracked before, which cannot be counted anew.
+    """Move a truth to the clock of a run that was tracked before, which cannot be counted again.
 
     Args:
         truth: the truth.

@@ -214,9 +214,9 @@ def interpolate_to(
 ) -> Resampled:
     """Smoothed trajectories at given times, between the two neighbouring rows of each track.
 
-    Nothing is said before a track's first row or after its last, nor at a time at which others have a row and
-    it has none: then it is known not to be reported. The same holds for the times at which the tracker ran,
-    if the table is one that has rows at each of these. The centre follows the quintic through
+    Nothing is reported before a track's first row or after its last, nor at a time at which others have a row
+    and it has none: then it is known not to be reported. The same holds for the times at which the tracker
+    ran, if the table is one that has rows at each of these. The centre follows the quintic through
     position, velocity and acceleration of both rows, which is the mean of the white-jerk motion model
     between two known states (Barfoot, State Estimation for Robotics, ch. 11), and the velocity is its
     derivative; a track without known motion moves in a straight line. Acceleration is linear in time: the

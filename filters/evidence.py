@@ -1,6 +1,6 @@
 """What is counted of a track by every sensor: the sufficient statistics of its posterior.
 
-Hits and misses count in correlation times, since a detector's errors last: two looks closer together are one
+Hits and misses count in correlation times, since a detector's errors last: two scans closer together are one
 witness. Scores are kept as a decaying peak and as a mean, and count once a track (`object_probability`). N
 tracks, S sensors.
 """
@@ -19,7 +19,7 @@ from jeat_graph.filters.model_constants import ModelConstants
 
 
 class ScanClock(NamedTuple):
-    """Of one scan: its time (s), the sensor's period (s), and the weight of a look in correlation times."""
+    """Of one scan: its time (s), the sensor's period (s), and the weight of a scan in correlation times."""
 
     t: float
     period_s: float
@@ -185,13 +185,13 @@ def count_hits(evidence: Evidence, hits: Hits, sensor: int, clock: ScanClock, c:
 def expect_hits(
     evidence: Evidence, p_detect: FloatArray, sees: FloatArray, clock: ScanClock, c: ModelConstants
 ) -> Evidence:
-    """Return the evidence as it is if a look finds nothing: the detections that were to be expected add up.
+    """Return the evidence as it is if a scan finds nothing: the detections that were to be expected add up.
 
     Args:
         evidence: before.
         p_detect: (N,) P_D of the sensor for each track.
         sees: (N,) probability that it is not blind to the track.
-        clock: of the look; looks closer together than `full_scan_s` are not one each.
+        clock: of the scan; scans closer together than `full_scan_s` are not one each.
         c: constants.
     """
     expected = p_detect * sees * min(1.0, clock.period_s / c.full_scan_s)
@@ -209,7 +209,7 @@ def count_misses(
         sensor: index of the sensor.
         visible: (K,) probability that they were visible.
         stationary: (K,) which of them stood.
-        weight: of a look, in correlation times.
+        weight: of a scan, in correlation times.
     """
     misses, of_stationary = evidence.misses.copy(), evidence.stationary_misses.copy()
     misses[rows, sensor] += weight * visible

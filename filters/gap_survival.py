@@ -1,7 +1,7 @@
 """How long an unseen track is reported: the learnt share of gaps that ended well.
 
 A gap is as long as the detections that were to be expected in it and did not come (`evidence.expect_hits`):
-what no sensor can see is no gap, and slow sensors and fast ones count alike. A(u) is the share of gaps of at
+what no sensor can see is no gap, slow sensors and fast ones count equally. A(u) is the share of gaps of at
 least length u at whose end the object was found where it had been predicted: a survival function of gaps,
 estimated in bins with a Beta prior e^(−u/τ). A gap that ends with the track ended badly.
 """

@@ -12,7 +12,7 @@ import numpy as np
 #: - `jerk` root spectral density of the track's jerk at the time (px/s^2.5), > 0.
 #: - `size_density` root spectral density of the rate of its ln size at the time (1/s^1.5).
 #: - `cut` (2,) which sides the edges of the picture cut (`cut_boxes.py`), `side` (2,) the side that shows
-#:   (px): there `z` and `r` are what that side and the track's size said of the centre.
+#:   (px): there `z` and `r` are what that side and the track's size say of the centre.
 #: - `noise` (2,) what of `r` is the noise of boxes, and not what an unknown size adds where one is cut (px²).
 #: - `log_size` (2,) ln width and ln height (ln px); `size_var` (2,) their variances.
 #: - `velocity_var` (2,), `acceleration_var` (2,), `rate_var`: where it started the track, the variances of

@@ -3,7 +3,7 @@
 What only bounds a computation, or follows from another definition, stands where it is used, in the C++ twin
 of a module too.
 
-Lengths are in sizes of the object (√(width · height)) wherever nothing else is said, so that the constants
+Lengths are in sizes of the object (√(width · height)) unless another unit stands there, so that the constants
 hold for any picture. "Prior" marks what only begins the learning of `noise_learning`, `object_probability`,
 `score_calibration` and `gap_survival`; "measured" was chosen on recordings of real detectors, one number for
 all of them.
@@ -119,7 +119,7 @@ class ModelConstants:
         threshold_bounds: of z.
         visible_to_hidden, hidden_to_visible, visible_to_gone, hidden_to_gone: rates of the chain of presence
         (1/s).
-        full_scan_s: a sensor whose looks are closer together than this expects less of each (s).
+        full_scan_s: a sensor whose scans are closer together than this expects less of each (s).
         gap_prior: a gap of u expected detections ends well with exp(−u / this). Prior.
         gap_prior_count: gaps that the prior counts for.
         gap_prior_least: shortest u of the prior.

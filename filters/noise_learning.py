@@ -3,9 +3,9 @@
 Innovations of a filter whose noise is right are white with covariance S: the normalised squares have mean 1
 (NIS), and the product of two successive ones has mean 0 (Mehra, *On the identification of variances and
 adaptive Kalman filtering*, IEEE Trans. Automatic Control 15, 1970). Squares too large: more measurement
-noise, per sensor. Successive ones alike: the filter lags, more process noise, of the scene. Each is a step of
-stochastic approximation of a log variance. This is the paper's NIS adaptation (algorithm 1) with the two
-causes distinguished.
+noise, per sensor. Successive ones of one sign: the filter lags, more process noise, of the scene. Each is a
+step of stochastic approximation of a log variance. This is the paper's NIS adaptation (algorithm 1) with the
+two causes distinguished.
 """
 
 from __future__ import annotations

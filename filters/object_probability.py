@@ -173,7 +173,7 @@ def testimony(evidence: Evidence, score: FloatArray, sensors: SensorBelief, c: M
 
 
 def blindness(hits: FloatArray, misses: FloatArray, sensors: SensorBelief, c: ModelConstants) -> FloatArray:
-    """Return the probability (N, S) that a sensor does not see a track, by its looks (N, S) and even odds."""
+    """Return the probability (N, S) that a sensor does not see a track, by its scans (N, S) and even odds."""
     seen = beta_binomial(hits, misses, sensors.p_detect, c)
     return np.asarray(expit(_by_chance(hits, misses, c) - seen))
 
@@ -224,7 +224,7 @@ def _weights(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> _W
     chance = _by_chance(evidence.hits, evidence.misses, c)
     stood = evidence.stationary_hits, evidence.stationary_misses
     moved = evidence.hits - stood[0], evidence.misses - stood[1]
-    # The detection that began the track is a look, too: a chance hit where the sensor cannot see it.
+    # The detection that began the track is a scan, too: a chance hit where the sensor cannot see it.
     begins = np.arange(len(sensors.p_detect)) == evidence.owner[:, None]
     birth = np.where(begins, math.log(c.chance_hit) - np.log(sensors.p_detect), 0.0)
     moving = beta_binomial(*moved, sensors.p_detect, c)
@@ -267,7 +267,7 @@ def log_odds_terms(evidence: Evidence, sensors: SensorBelief, c: ModelConstants)
     best = sides.argmax(axis=1)
     is_noise = best == w.false.shape[1]
     other = np.where(is_noise, -1, best)
-    # What each sensor's looks weigh under the other hypothesis.
+    # What each sensor's scans weigh under the other hypothesis.
     against = w.shared.copy()
     # Scores count as far as the sensor sees the object.
     unscored = np.where(np.arange(w.scores.shape[1]) == evidence.owner[:, None], w.never - w.scores, w.never)

@@ -146,7 +146,7 @@ def process_covariance(
 
 
 def in_perspective(F: FloatArray, mean: FloatArray, dt: float, c: ModelConstants) -> FloatArray:
-    """Return the transitions (N, 1, 7, 7) of tracks that keep their velocity in space, both axes alike.
+    """Return the transitions (N, 1, 7, 7) of tracks that keep their velocity in space, for both axes.
 
     With g the mean growth rate of both axes, v̇ = 2 g v and ġ = g² have the solutions v e^(2 g Δ) and
     g / (1 − g Δ); position and ln size follow by their integrals. g counts as known.

@@ -1,6 +1,6 @@
 """Presence of an object as a Markov chain: visible, hidden, gone.
 
-A continuous-time chain with constant rates (Norris, *Markov Chains*, ch. 2); a sensor that looks and finds
+A continuous-time chain with constant rates (Norris, *Markov Chains*, ch. 2); a sensor whose scan finds
 nothing speaks against "visible" alone, by Bayes' rule: P(visible) ∝ P(visible) (1 − P_D).
 Arrays are (N, 3): probabilities of VISIBLE, HIDDEN, GONE, whose sum is 1.
 """
@@ -42,7 +42,7 @@ def predict(presence: FloatArray, dt: float, c: ModelConstants) -> FloatArray:
 
 
 def miss(presence: FloatArray, p_detect: FloatArray) -> FloatArray:
-    """Return the presence (N, 3) after a look that found nothing; P_D (N,) is of a visible object."""
+    """Return the presence (N, 3) after a scan that found nothing; P_D (N,) is of a visible object."""
     out = presence.copy()
     out[:, VISIBLE] *= 1.0 - p_detect
     return np.asarray(out / out.sum(axis=1, keepdims=True))

@@ -48,7 +48,7 @@ class FilteredTrack:
         mean: (K, A, D) after it.
         covariance: (K, A, D, D).
         sensor: (K,) index of the sensor whose box was taken in, −1 where none was.
-        output: what is told as place, velocity and acceleration; None: the first three of a state.
+        output: what is reported as place, velocity and acceleration; None: the first three of a state.
     """
 
     track_id: int
@@ -65,11 +65,11 @@ class FilteredTrack:
         return len(self.t)
 
     def motion(self, mean: FloatArray) -> FloatArray:
-        """Return what is told (..., 3) of states (..., D): place, velocity and acceleration."""
+        """Return the output (..., 3) of states (..., D): place, velocity and acceleration."""
         return mean[..., :MOTION] if self.output is None else self.output.mean(mean)
 
     def motion_covariance(self, mean: FloatArray, covariance: FloatArray) -> FloatArray:
-        """Return the covariance (..., A, 3, 3) of what is told of states (..., A, D) with theirs."""
+        """Return the covariance (..., A, 3, 3) of the output of states (..., A, D) with theirs."""
         if self.output is None:
             return covariance[..., :MOTION, :MOTION]
         return self.output.covariance(mean, covariance)

@@ -139,7 +139,7 @@ class Histories:
     Args:
         lag_s: fixed lag (s); infinite for whole tracks.
         existence: which rows are given.
-        output: how states are told.
+        output: how states are reported.
         solver: of the states; our own pass if None.
     """
 
@@ -360,7 +360,7 @@ class Histories:
 
 
 def _entry(record: StepRecord, scan: FilterRecord, row: int, last: bool) -> TrackUpdate:
-    """Return the update of one track in one scan; what is told of a step stands in its last scan."""
+    """Return the update of one track in one scan; the output of a step stands in its last scan."""
     return TrackUpdate(
         t=record.t,
         F=scan.F[row],

@@ -9,7 +9,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import FloatArray, IntArray
 
-#: Numbers that are told of a track along an axis: place, velocity, acceleration, ln size and its rate.
+#: Numbers that are reported of a track along an axis: place, velocity, acceleration, ln size and its rate.
 REPORTED = 5
 #: Time, identity, mean (N, 10), variance (N, 10), posterior, sensors that found it at that time, number of
 #: the class, and its share of the votes.
@@ -22,7 +22,7 @@ class RowOutput(NamedTuple):
     """How what tables tell follows from the states of an engine.
 
     Attributes:
-        mean: from means (..., 2, D), what is told (..., 2, 5).
+        mean: from means (..., 2, D), the output (..., 2, 5).
         covariance: from means and covariances (..., 2, D, D), that of it (..., 2, 5, 5).
     """
 
@@ -54,7 +54,7 @@ def rows_of(
         states: means (N, 2, D) and covariances (N, 2, D, D).
         real: (N,) posteriors.
         used: (N,) bits of the sensors that found it at that time.
-        output: how the states are told.
+        output: how the states are reported.
     """
     variance = np.diagonal(output.covariance(*states), axis1=2, axis2=3)
     flat = output.mean(states[0]).reshape(-1, 2 * REPORTED), variance.reshape(-1, 2 * REPORTED)

@@ -6,8 +6,8 @@
 by known amounts (a camera's motion) is in m⁻' and needs no term of its own. Each track has axes that are
 independent of each other; it lives through successive records without a break.
 
-The order of all sums is that of `core/smoothers/state_rts.hpp`, so both round alike: on a long gap the
-condition of P⁻ is 1e10, and of two orders of summation the results would differ by as many roundings.
+The order of all sums is that of `core/smoothers/state_rts.hpp`, so both round in the same way: on a long gap
+the condition of P⁻ is 1e10, and of two orders of summation the results would differ by as many roundings.
 """
 
 from __future__ import annotations

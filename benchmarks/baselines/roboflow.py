@@ -24,7 +24,7 @@ ROBOFLOW: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 class RoboflowTracker:
-    """One tracker of the package `trackers`. It is told the time of each frame, so missed frames do no harm.
+    """One tracker of the package `trackers`. It gets the time of each frame, so missed frames do no harm.
 
     Args:
         name: key of `ROBOFLOW`.

@@ -18,7 +18,7 @@ from jeat_graph.eval.matching import match
 from jeat_graph.eval.protocols.plain import take_truth
 from jeat_graph.eval.protocols.record import FrameBoxes, Judged, JudgingProtocol
 
-#: Classes that are judged, with one that looks alike and may be found too.
+#: Classes that are judged, with a similar one that may be found too.
 SIMILAR = {"car": "van", "pedestrian": "person"}
 _REGION = "dontcare"
 # Objects beyond these need not be found; a track that is matched to nothing must be higher (px).
@@ -50,7 +50,7 @@ def judge(frame: FrameBoxes, wanted: str | None) -> Judged:
 
 
 def prepare(truth: GroundTruth, tracks: Trajectories, wanted: str | None) -> tuple[GroundTruth, Trajectories]:
-    """Take the objects of a class and of the one that is alike, the regions, and the tracks of the class.
+    """Take the objects of a class and of the similar one, the regions, and the tracks of the class.
 
     Raises:
         DataError: the truth does not say how far objects are hidden and cut, or tracks have no classes.

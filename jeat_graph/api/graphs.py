@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def factor_graph(run: PathLike, tracks: int | Iterable[int] | None = None) -> FilterGraph:
     """Return GTSAM's factor graph and values of a run's tracks, to be looked at, added to and solved.
 
-    Priors, motion with the process noise that the filter took, and what every detection told of the state
+    Priors, motion with the process noise that the filter took, and what every detection says of the state
     with the noise that the filter gave its sensor, one state a scan. Solved as it is, it gives what
     whole-track smoothing gives; `docs/guides/factor-graph.md` adds to it.
 

@@ -62,7 +62,7 @@ def lag_of(
     """
     if len(error) < _LEAST_ROWS or len(np.unique(key)) < _LEAST_TRACKS:
         return Lag(sensor, 0.0, float("inf"), False)
-    # Errors go with the size: in units of it the rows count alike. One bias an axis.
+    # Errors go with the size: in units of it the rows count equally. One bias an axis.
     size = np.sqrt(side.prod(axis=1))[:, None]
     y = (error / size).ravel()
     columns = np.zeros((len(error), 2, 3))

@@ -197,10 +197,10 @@ def _write_od(
 
 
 def _publication(args: argparse.Namespace) -> PublicationOptions | None:
-    """Return what is said of the publication in DATEX II, or None if none is asked for.
+    """Return what is declared of the publication in DATEX II, or None if none is asked for.
 
     Raises:
-        ConfigError: something that it needs is missing, or said without it.
+        ConfigError: something that it needs is missing, or given without it.
     """
     if args.datex is not None:
         return PublicationOptions(args.begin, args.publisher, args.publication_time, args.site_table)

@@ -35,7 +35,7 @@ _CLOCKS = {"t": "time", "t_from": "begin", "t_to": "end", "t_start": "begin", "t
 
 
 def clock_s(begin: str | None) -> float:
-    """Return the clock's time (s since 1970) of a recording's time 0; 0 where it is not said.
+    """Return the clock's time (s since 1970) of a recording's time 0; 0 where it is not declared.
 
     Raises:
         ConfigError: no date and time.

@@ -145,7 +145,7 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     from jeat_graph.runs.run_options import RunOptions, RunRecord
     from jeat_graph.runs.tracking_run import write_run
 
-    config = load_config(args.config)  # what is wrong in it is said before anything is simulated
+    config = load_config(args.config)  # what is wrong in it is reported before anything is simulated
     recording = _recording(args)
     config = as_config(config, (recording.width, recording.height))
     config = fit_input(config, recording.detections)[0]

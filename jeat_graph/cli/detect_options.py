@@ -1,4 +1,4 @@
-"""Options of the commands that detect in raw pictures and events, or that are told what did."""
+"""Options of the commands that detect in raw pictures and events, or that declare what did."""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ def add_made_by(parser: argparse.ArgumentParser) -> None:
 
 
 def made_by(args: argparse.Namespace, say: Callable[[str], object]) -> list[str]:
-    """Return what the configuration `default` is told of networks whose boxes come from elsewhere.
+    """Return what is declared to the configuration `default` of networks whose boxes come from elsewhere.
 
     Raises:
         ConfigError: a network that is not known, one of which nothing is known, or another configuration.

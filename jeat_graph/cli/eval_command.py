@@ -175,7 +175,7 @@ def run(args: argparse.Namespace) -> int:
 def _names(runs: Sequence[str], truths: Sequence[str]) -> list[str]:
     """Return what the rows of the table are called: each run, if one truth is that of several, else one name.
 
-    The last part of each path, or the whole paths where two end alike.
+    The last part of each path, or the whole paths where two have the same end.
 
     Raises:
         DataError: neither one truth nor one for each run, or a run twice that is to have a row of its own.

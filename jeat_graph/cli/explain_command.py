@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
             lines = identity_texts(identities, args.track)
             wanted += [one.causal_id for one in identities.of_identity(args.track)]
         found = explain_tracks(config, detections, set(wanted))
-    # An identity that no causal track began with is told of by the causal tracks that it is made of.
+    # An identity that no causal track began with is explained by the causal tracks that it is made of.
     shown = [args.track] if args.track in found else list(dict.fromkeys(wanted[1:]))
     if not shown:
         raise DataError(f"there is no track {args.track}")

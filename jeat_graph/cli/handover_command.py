@@ -24,7 +24,7 @@ _MEASURE = re.compile(
     r"(?P<value>[-+]?[\d.]+(?:e[-+]?\d+)?)\s*(?:(?:±|\+-|\+/-)\s*(?P<sd>[\d.]+(?:e[-+]?\d+)?))?"
 )
 _say = partial(say, "handover")
-#: Of a distance that is told without one, as a share.
+#: Of a distance that is given without one, as a share.
 _USUAL_DISTANCE_SD = 0.01
 _INTERVAL_S = 300.0
 
@@ -176,7 +176,7 @@ def _of_appearance(over: Handover) -> str:
 
 
 def _gaps(args: argparse.Namespace) -> list[KnownGap]:
-    """What is told of the gaps: by a file, and by arguments, which come first."""
+    """What is declared of the gaps: by a file, and by arguments, which come first."""
     from jeat_graph.corridor.corridor_file import read_known_gaps
     from jeat_graph.corridor.handover import KnownGap
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 # So many parts are named.
 _MOST_PARTS = 12
-# A link within a causal track is told of if its probability is less.
+# A link within a causal track is shown if its probability is less.
 _SURE = 0.9
 
 

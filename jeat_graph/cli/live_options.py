@@ -68,7 +68,7 @@ def opened_cameras(
 def camera_settings(
     args: argparse.Namespace, cameras: LiveDetecting, say: Callable[[str], object]
 ) -> list[str]:
-    """Return what the configuration is told of the detectors, and of the picture unless `--image` says it."""
+    """Return what is declared of the detectors, and of the picture unless `--image` says it."""
     from jeat_graph.cli.options import image_overrides
     from jeat_graph.detection.declared import declared_settings
 

@@ -37,7 +37,7 @@ class PatternMap(NamedTuple):
         names: of the sensor whose picture is the common one, and of the other.
         sizes: width and height of their pictures (px).
         way: from the other's picture to the common one.
-        lines: to be said.
+        lines: to be reported.
     """
 
     names: tuple[str, str]

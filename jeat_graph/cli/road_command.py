@@ -147,7 +147,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _notes(result: RoadResult) -> list[str]:
-    """Return what is not told, and why."""
+    """Return what is not reported, and why."""
     notes = [
         f"{count} tracks are left out, {reason} (left_out.csv)"
         for reason, count in Counter(one.reason for one in result.left_out if not one.line).items()

@@ -235,7 +235,7 @@ def _take_picture_of(camera: RoadCamera, args: argparse.Namespace) -> None:
     """Take the picture's size from the camera's file where nothing else says it.
 
     Raises:
-        DataError: the picture is said to have another size, so that the camera is not that of its boxes.
+        DataError: the picture is declared with another size, so that the camera is not that of its boxes.
     """
     from jeat_graph.config.reading import load_config
 

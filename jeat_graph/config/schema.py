@@ -51,8 +51,8 @@ class Config:
 
     def __post_init__(self) -> None:
         if self.tracker.engine == "paper" and self.smoother.identities in ("lag", "whole"):
-            said = repr(self.smoother.identities)
-            raise ConfigError(f"smoother.identities: {said} needs another engine than tracker.engine=paper")
+            given = repr(self.smoother.identities)
+            raise ConfigError(f"smoother.identities: {given} needs another engine than tracker.engine=paper")
         if not self.sensors and self.input.undeclared != "declare":
             raise ConfigError("sensors: at least one sensor must be declared")
         if len(self.sensors) > MOST_SENSORS:

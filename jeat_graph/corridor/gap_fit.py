@@ -93,7 +93,7 @@ def fit_gap(gap: Gap, prior: Prior, offset_s: float, rounds: int = _ROUNDS) -> F
         gap: the cameras.
         prior: what is known.
         offset_s: where to begin with the clock.
-        rounds: at most so many, and as many again each time that looks are learnt.
+        rounds: at most so many, and as many again each time that appearance is learnt.
     """
     a, b = len(gap.before), len(gap.after)
     span = max(gap.after.span_s[1] - gap.after.span_s[0], 1.0)

@@ -5,7 +5,7 @@ Of the pair of passage i at camera A and j at camera B the log ratio is
     ln [ m q_i p(v_j | v_i) p(t_j | t_i, v_i, v_j) p(lane_j | lane_i) p(length_j | length_i)
          p(class_j | class_i) ] − ln [ (1 − m q_i) β p(v_j) p(lane_j) p(length_j) p(class_j) ],
 
-and what their looks say, where there are embeddings (`appearance`);
+and what their appearance says, where there are embeddings (`appearance`);
 m the share of A's vehicles that reach B, q_i the probability that i would pass within B's recording, β the
 rate of B's vehicles that do not come from A. With z the ln of the speed less that of the traffic at this
 time and lane, and μ that of the traffic,

@@ -31,7 +31,7 @@ _CLOCK_SIGMAS = 4.0
 
 @dataclass(frozen=True)
 class KnownGap:
-    """What is told of a gap.
+    """What is declared of a gap.
 
     Attributes:
         first, second: names of the cameras.
@@ -52,7 +52,7 @@ class Handover:
     """One gap, solved.
 
     Attributes:
-        known: what was told of it.
+        known: what was declared of it.
         fitted: the gap and the probabilities of all pairs.
         peak: of the search for the clock.
         first, second: (P,) rows of the vehicles that are handed over, at both cameras.

@@ -65,7 +65,7 @@ class LearntGap:
 
 
 def model_tree(over: Handover) -> dict[str, Any]:
-    """Return the model of a gap, which stands in `corridor.yaml` besides what is told of the gap."""
+    """Return the model of a gap, which stands in `corridor.yaml` besides what is declared of the gap."""
     fitted, p = over.fitted, over.fitted.parameters
     a, b = fitted.gap.before, fitted.gap.after
     span = max(b.span_s[1] - b.span_s[0], 1.0)

@@ -19,12 +19,12 @@ from jeat_graph.corridor.live_gap import Arrived, LiveGap, LivePassage, Travelle
 from jeat_graph.road.speeds import KMH
 
 Event = dict[str, Any]
-#: A passage of a track that passed within this time (s) is the same one, told again.
+#: A passage of a track that passed within this time (s) is the same one, reported again.
 _SAME_S = 2.0
 #: So many passages of each camera are remembered for that.
 _MOST_REMEMBERED = 4096
-#: Of so many vehicles the expected share that was followed rightly is told, and doubted if it is below this
-#: part of what was learnt.
+#: Of so many vehicles the expected share that was followed rightly is reported, and doubted if it is below
+#: this part of what was learnt.
 _JUDGED, _LEAST_PART = 60, 0.55
 
 
@@ -89,7 +89,7 @@ class LiveCorridor:
         self._now[k] = max(self._now[k], t)
 
     def passed(self, camera: str, passage: LivePassage) -> bool:
-        """Take in a vehicle at a camera's line; whether it is new: after a fault some are told again."""
+        """Take in a vehicle at a camera's line; whether it is new: after a fault some are reported again."""
         k = self.order.index(camera)
         reported = self._reported[k]
         if abs(reported.get(passage.track_id, -math.inf) - passage.t) < _SAME_S:
@@ -106,7 +106,7 @@ class LiveCorridor:
         return True
 
     def decide(self) -> list[Event]:
-        """Decide about all who have been there for long enough; returns what is to be told."""
+        """Decide about all who have been there for long enough; returns what is to be reported."""
         events: list[Event] = []
         until = self._now[0]
         for k, gap in enumerate(self._gaps):

@@ -2,7 +2,7 @@
 
 The model is that of the recordings (`gap_model`), with what was learnt from them. A vehicle at the second
 camera is decided about some seconds after it has come, when those that it might be confused with have come
-too. What is estimated anew all the time is the slowness that vehicles share, from those that have arrived.
+too. What is estimated all the time is the slowness that vehicles share, from those that have arrived.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Embeddings: what a part of a picture looks like, as a vector in which alike objects lie close together.
+"""Embeddings: what a part of a picture looks like, as a vector in which similar objects lie close together.
 
 They come from a network for re-identification. Only their directions count, and only those of one sensor are
 compared with each other.

@@ -26,7 +26,7 @@ class LostError(JeatGraphError):
 
 
 class OtherRunError(JeatGraphError):
-    """A run that was broken off and cannot be gone on with: its state is another's, or damaged."""
+    """A run that was broken off and cannot be continued: its state is another's, or damaged."""
 
 
 class CoreMissingError(JeatGraphError, ImportError):

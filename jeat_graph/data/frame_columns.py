@@ -18,7 +18,7 @@ from jeat_graph.data.errors import DataError
 
 #: Columns that say classes, and which video a row is of.
 ASIDE = (*CLASS_COLUMNS, "video")
-#: What is said where a box is missing; `x` and `y` alone may be a corner or the centre.
+#: The message where a box is missing; `x` and `y` alone may be a corner or the centre.
 KNOWN_BOXES = (
     "known are left, top, width, height, or x1, y1 and cx, cy for the place, w, h and right, bottom or "
     "x2, y2 for the size (all names: docs/reference/formats.md)"

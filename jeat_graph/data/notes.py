@@ -25,7 +25,7 @@ def note(text: str) -> None:
 
 @contextmanager
 def listening(say: Callable[[str], object]) -> Iterator[None]:
-    """Have notes told while the `with` block runs, each once, even where a file is read several times.
+    """Have notes reported while the `with` block runs, each once, even where a file is read several times.
 
     Args:
         say: called with each new note.

@@ -15,7 +15,7 @@ def median_rate_hz(*clocks: FloatArray) -> float | None:
 
     Args:
         clocks: (N,) ascending (s), of each recording of it: the steps of all are pooled. Of fewer than two
-            times, or where most are equal, nothing can be told.
+            times, or where most are equal, nothing is known.
     """
     steps = np.concatenate([np.diff(times) for times in clocks])
     step = float(np.median(steps)) if len(steps) else 0.0

@@ -44,7 +44,8 @@ def detect_before(
     Args:
         request: what to look for, and where.
         out: the run directory.
-        declare: whether the tracker takes what is known of the networks, as `default` does: then it is said.
+        declare: whether the tracker takes what is known of the networks, as `default` does: then it is
+            reported.
         say: called with each thing that was found out.
         detect: looks; by default `detect_files`.
 

@@ -136,7 +136,7 @@ class BinnedDetector:
         number = first_us // self._bins.bin_us
         self._bins.skip_to(number * self._bins.bin_us)
         self._until_scan = self._step_bins - number % self._step_bins
-        while self._until_scan < self._filled_bins:  # nothing is said of a window that is not full
+        while self._until_scan < self._filled_bins:  # nothing is reported of a window that is not full
             self._until_scan += self._step_bins
         self._emptied()
 

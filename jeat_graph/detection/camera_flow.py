@@ -36,10 +36,10 @@ _EVERY, _SAME_LIGHT = 4, 0.01
 # Boxes are taken larger by this share on each side: detectors cut, and shadows go along.
 _MARGIN = 0.1
 # Degrees of freedom of t, reweightings, and the least error of a corner (px). Corners near each other err
-# alike, so many count for one, and all of them by so much (px): what interpolation between pixels costs.
+# the same, so many count for one, and all of them by so much (px): what interpolation between pixels costs.
 _DEGREES, _PASSES, _LEAST_ERROR_PX, _CORRELATED, _COMMON_PX = 4.0, 4, 0.05, 4.0, 0.03
 # A camera moves if the corners of its picture do by more than this (px), and by so many standard deviations;
-# after that for so long (s) every motion is told.
+# after that for so long (s) every motion is reported.
 _STILL_PX, _STILL_DEVIATIONS, _MOVES_S = 0.1, 4.0, 5.0
 # A key picture is left when so few of its corners are found, when the picture has gone this share of its
 # width or grown so much, or after so long (s) where the picture is not where it was.
@@ -48,7 +48,7 @@ _KEY_FOUND, _KEY_MOVED, _KEY_GROWN, _KEY_S = 0.5, 0.15, 0.1, 10.0
 
 @dataclass(frozen=True)
 class CameraSettings(Section):
-    """Whether, and how, the motion of the camera is told from its pictures."""
+    """Whether, and how, the motion of the camera is found in its pictures."""
 
     # Not unless asked: where a camera stands, headlights that sweep a dark road pass for its motion.
     follow: bool = flag(False, "whether networks tell how the camera moves")

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from jeat_graph.core import detection as core
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 
-#: Whole numbers of 32 bits: half of the memory that has to be gone through.
+#: Whole numbers of 32 bits: half of the memory that has to be read.
 Whole = npt.NDArray[np.int32]
 
 

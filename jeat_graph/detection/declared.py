@@ -1,4 +1,4 @@
-"""What the tracker is told of a network: a file beside it, which holds what was measured of its boxes.
+"""What is declared to the tracker of a network: a file beside it, which holds what was measured of its boxes.
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
 configuration: `rate_hz`, `even_score`). Of a foreign network of pictures without such a file, the layout of

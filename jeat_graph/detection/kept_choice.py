@@ -2,7 +2,7 @@
 
 `chosen.json` in the folder of the networks has an entry for each camera, by its address without logins. It
 holds while the same networks are on this machine and the same classes are looked for; else the choice is made
-anew. A choice by an empty road is not kept, for nothing spoke for it.
+again. A choice by an empty road is not kept, for nothing spoke for it.
 """
 
 from __future__ import annotations

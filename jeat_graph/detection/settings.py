@@ -33,9 +33,9 @@ _TRIM = (
     "its box"
 )
 _INSIDE = "a group is part of a heavier one if this share of its box lies in the other's"
-#: Scans of events per second where nothing is said, and of networks beside pictures. More scans of a network,
-#: whose windows overlap, repeat its false boxes: beside pictures 20 Hz are better tracked than 50 Hz, and
-#: cost two fifths (`docs/benchmarks/raw.md`).
+#: Scans of events per second where nothing is declared, and of networks beside pictures. More scans of a
+#: network, whose windows overlap, repeat its false boxes: beside pictures 20 Hz are better tracked than 50
+#: Hz, and cost two fifths (`docs/benchmarks/raw.md`).
 USUAL_RATE_HZ, BESIDE_RATE_HZ = 50.0, 20.0
 _RATE = (
     f"scans per second; a step is a whole number of bins; null: {USUAL_RATE_HZ:g}, and {BESIDE_RATE_HZ:g} of "

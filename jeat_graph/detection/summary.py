@@ -63,7 +63,7 @@ class EventSummary(NamedTuple):
     def lines(self) -> list[str]:
         """Return the summary as text."""
         width, height = self.size_px
-        known = "" if self.size_known else " (not said; so far the events reach)"
+        known = "" if self.size_known else " (not declared; so far the events reach)"
         return [
             f"format: {self.format_name}",
             f"picture: {width} x {height} px{known}",

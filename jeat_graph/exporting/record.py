@@ -52,7 +52,7 @@ class ExportTarget:
         name: of `--to`.
         program: who reads it, for the docs.
         writes: what is written, and how its name ends.
-        write: writes it, and returns what is said of it behind `wrote OUT`; raises `DataError`.
+        write: writes it, and returns the text behind `wrote OUT`; raises `DataError`.
         options: those of `SOME_TAKE` that it takes.
     """
 

@@ -19,7 +19,7 @@ def exports() -> tuple[ExportTarget, ...]:
 
 
 def write_export(request: ExportRequest) -> str:
-    """Write for another program, and return what is said of it.
+    """Write for another program, and return the text behind `wrote OUT`.
 
     Raises:
         DataError: no such export, an option that it cannot make use of, or what its writer says.

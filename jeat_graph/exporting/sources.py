@@ -46,7 +46,7 @@ def summary_of(tables: dict[str, Trajectories]) -> str:
 
 
 def tables_at_frames(request: ExportRequest) -> tuple[Trajectories, float, str]:
-    """Return a run's table at frame times, their rate (Hz), and what is said of it.
+    """Return a run's table at frame times, their rate (Hz), and the text behind `wrote OUT`.
 
     Raises:
         DataError: no rate is known, or as `run_tables`.

@@ -1,8 +1,8 @@
 """Sees a sensor's clock step: its own intervals jump, while the scans of the others go on as before.
 
-A pause and a step look alike in one sensor's times. They differ in what arrives meanwhile: in a pause of one
-sensor, or of all, the others' times go on by as much; when a clock steps they do not. So the others are the
-clock by which a sensor's own intervals are judged, and the clock on the wall is never asked.
+A pause and a step look the same in one sensor's times. They differ in what arrives meanwhile: in a pause of
+one sensor, or of all, the others' times go on by as much; when a clock steps they do not. So the others are
+the clock by which a sensor's own intervals are judged, and the clock on the wall is never asked.
 
 ==========================  ==========================================================================
 a scan                      what is done

@@ -52,7 +52,7 @@ class ClockNews(NamedTuple):
     Attributes:
         taken_off: by sensor, what is taken off its times from now on, beside what was before.
         newest: by sensor, the newest of its times before that (s).
-        lines: what is to be said.
+        lines: what is to be reported.
     """
 
     taken_off: dict[str, FoundClock]
@@ -274,7 +274,7 @@ class ClockWatch:
         return ClockNews(taken, newest, lines) if taken or lines else None
 
     def _once(self, key: str, line: str) -> list[str]:
-        """Return a line that was not told yet; what a minute shows is not told before."""
+        """Return a line that was not reported yet; what a minute shows is not reported before."""
         if key in self._warned or self._compared < _EARLY:
             return []
         self._warned.append(key)

@@ -1,4 +1,4 @@
-"""When a broker is told what has been taken: seldom, for each time may write a checkpoint, but in time."""
+"""When what was taken is confirmed to a broker: seldom, for each time may write a checkpoint, but in time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 #: Not sooner than this after the last time (s), unless the broker would send no more.
 PACE_S = 1.0
-#: Part of what may be open after which a source is told.
+#: Part of what may be open after which it is confirmed to a source.
 _PART = 0.5
 #: Brokers may send fewer than they are asked for, but no fewer than this: then quiet may mean that they wait.
 _BROKERS_LEAST = 20

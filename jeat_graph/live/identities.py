@@ -85,7 +85,7 @@ class Identities:
             next_own: number of the next track to be born after them.
             by_step: (M,) of each step, the own number of the track that took each detection; 0 if none did.
             known: (M,) of each step, the identity whose track took it the time before; 0 if none did.
-            unsettled: number of the first track that the smoothers have not been told of.
+            unsettled: number of the first track that the smoothers have not got yet.
 
         Returns:
             `known` for the next time: an identity is remembered where nobody takes the detection now.
@@ -123,7 +123,7 @@ class Identities:
         shown = np.append(self._shown[:cut], np.zeros(next_own - first, dtype=np.bool_))
         answered = np.append(self._given[cut:][self._shown[cut:]], self._lost)
         if before.any():
-            # What nobody has been told of may still turn out to be the vehicle of an identity given out.
+            # What has not been reported may still turn out to be the vehicle of an identity given out.
             open_ = ~shown & (own >= unsettled)
             taken = np.flatnonzero((assigned > 0) & (before > 0) & ~np.isin(before, given[~open_]))
             taken = taken[open_[np.searchsorted(own, assigned[taken])]]

@@ -3,7 +3,7 @@
 A tracker keeps a snapshot of its arrays before each of its latest steps. A scan that comes late goes to the
 place where it belongs: the state before that place is restored and the scans since are taken again. Scans of
 one time are taken jointly, whenever they came. So the state is that of tracking in order of time, to the last
-bit, and so are the smoothed trajectories: the smoothers are told of a step only when nothing can come before.
+bit, and so are the smoothed trajectories: the smoothers get a step only when nothing can come before.
 """
 
 from __future__ import annotations
@@ -186,7 +186,7 @@ class LiveTracker(OneAtATime):
         return judged
 
     def _text_of_steps(self, judged: Judged, news: ClockNews | None) -> ClockNews | None:
-        """Take steps of clocks off from now on, and add what is to be said of them to the other news."""
+        """Take steps of clocks off from now on, and add what is to be reported of them to the other news."""
         if judged.together:
             line = f"warning: the clock of all sensors was set back by {judged.together:.3f} s"
             news = news or ClockNews({}, {}, [])

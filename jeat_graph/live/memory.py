@@ -1,4 +1,4 @@
-"""What has come before, told by its content, in bounded memory.
+"""What has come before, known by its content, in bounded memory.
 
 Fingerprints of 64 bits are kept of all that came, as long as there are few. When there are more than fit,
 only every other one is kept, by its own lowest bit, then one in four, and so on. So what is kept is a sample

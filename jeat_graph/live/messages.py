@@ -2,7 +2,7 @@
 
 A message of scans is `{"v": 1, "source": "gantry7", "seq": 41, "scans": [scan, …]}`, each scan as in a line
 of `stream` (`io.streams.scan_lines`), all of one time; `source` and `seq`, a whole number that rises by
-source, are what duplicates are told by. A scan, or a list of scans, alone is taken too. One of tracks is
+source, are what duplicates are known by. A scan, or a list of scans, alone is taken too. One of tracks is
 `{"v": 1, "seq": 7, "source": …, "of": 41, "t": …, "tracks": […]}`, where `source` and `of` say which message
 it answers. Both are JSON, or MessagePack of the same structure, which may hold boxes (M, 4) and scores (M,)
 as bytes: 64-bit floats, the lowest byte first.
@@ -27,7 +27,7 @@ VERSION = 1
 #: Of the name of a source; numbers of messages are below `MOST_SEQ`.
 MOST_CHARACTERS, MOST_SEQ = 256, 1 << 63
 _KEYS = ("v", "source", "seq", "scans")
-# MessagePack has times of its own, which its package gives in seconds since 1970 when told so.
+# MessagePack has times of its own, which its package gives in seconds since 1970 when asked to.
 _TIMESTAMP_S = 1
 _FIRST_OF_TEXT = frozenset(bytes([c]) for c in b" \t\r\n{[\xef")
 _ENCODER = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"))
@@ -171,14 +171,14 @@ class Duplicates:
     Of each source the greatest number is kept, and which of the `WINDOW` numbers below it have come: one that
     is older counts as a duplicate. But a message that comes twice is as old as it was: where a number that
     was used up comes with a scan newer than any of its source, or with another time than it had, the source
-    has begun to count anew, as a detector does that is started again, maybe with its clock set back. What
-    came before stays known, for a broker may deliver it once more. Of more than `SOURCES` sources the one
-    that has been silent for longest is forgotten.
+    has begun to count from the start again, as a detector does that is started again, maybe with its clock
+    set back. What came before stays known, for a broker may deliver it once more. Of more than `SOURCES`
+    sources the one that has been silent for longest is forgotten.
 
     Attributes:
         seen: by source its counts, the last one or the last two; the time of a scan says whose a number is.
             The one heard last comes last.
-        restarts: by source, how often it began to count anew.
+        restarts: by source, how often it began to count from the start again.
         forgotten: how many sources have been forgotten.
     """
 

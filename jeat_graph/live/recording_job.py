@@ -24,7 +24,7 @@ _STAGING = ".unfinished-*"
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker is told.
+    """What a worker gets.
 
     Attributes:
         name: the recording's name.

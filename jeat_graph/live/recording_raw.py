@@ -12,7 +12,7 @@ from jeat_graph.detection.request import DetectRequest
 from jeat_graph.runs.track_files import TrackRequest
 from jeat_graph.version import __version__
 
-#: Beside the detections: what they were made from, and what the tracker is told; written last.
+#: Beside the detections: what they were made from, and what is declared to the tracker; written last.
 SOURCE = "detected.json"
 
 

@@ -70,7 +70,7 @@ class Repetition:
             self._memory.note(fingerprint_of(scan))
 
     def begins(self, first: float | None = None) -> None:
-        """Note that time goes on elsewhere; anew from a first scan (s), if it is given."""
+        """Note that time goes on elsewhere; from a first scan (s) again, if it is given."""
         self.until = None
         if first is not None:
             self.first = first
@@ -94,7 +94,7 @@ class Repetition:
         return was_taken(scan)
 
     def _between(self, t: float) -> bool:
-        """Whether a time (s) is known to be none that the tracker has gone through."""
+        """Whether a time (s) is known to be none of the tracker's steps."""
         if self.first is not None and not self._base.near(min(t, self.first), self.first):
             return True  # from before all that had come: a clock has been set back
         leap = self._base.leap

@@ -27,7 +27,7 @@ class ReplayableStep:
         scans: its scans, sensors in alphabetical order.
         before: the tracker's state before it.
         living: identities (N,) of the tracks that lived before it, and that of the next one to be born.
-        taken: what the smoothers are to be told of it.
+        taken: what the smoothers are to get of it.
         known: (M,) identity whose track took each detection, 0 where none ever did.
     """
 
@@ -58,7 +58,7 @@ class Rewinding:
     Attributes:
         steps: the steps that may still be taken again, by time.
         replayed: how many steps have been taken again so far.
-        settled: time of the last step that the smoothers have been told of (s).
+        settled: time of the last step that the smoothers have got (s).
         identities: what is given out for the tracks.
     """
 

@@ -127,7 +127,7 @@ class Session:
             self._health.usual = kept.get("usual", {})
         self._pace = CommitPace()
         self._warnings = SessionWarnings(ends.warn, live.tracker.config.live.jump_s)
-        self._owed = False  # the tracker has taken a scan whose answer has not gone out
+        self._owed = False  # the tracker has taken a scan whose answer has not been sent
         self._unconfirmed = ""  # or why the last answers may not have arrived
         self._interval = None if live.time is None else live.time // every_s
 

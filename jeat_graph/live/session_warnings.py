@@ -1,6 +1,6 @@
-"""What the user of a live session is told: of scans that are not taken, and of times that jump.
+"""Warnings to the user of a live session: of scans that are not taken, and of times that jump.
 
-What may come often is told of the first times, and is then counted; what goes on for long is told of again
+What may come often is reported the first times, and is then counted; what goes on for long is reported again
 and again (see `untaken`).
 """
 
@@ -14,7 +14,7 @@ from jeat_graph.live.arrival import Arrival
 from jeat_graph.live.messages import ScanMessage
 from jeat_graph.live.untaken import Untaken, UntakenRun
 
-#: So many scans passed over are told one by one; the rest is in the summary.
+#: So many scans passed over are reported one by one; the rest is in the summary.
 MOST_WARNED = 5
 
 
@@ -23,18 +23,18 @@ class SessionWarnings:
 
     Args:
         warn: takes one line.
-        jump_s: of the settings: so long (s) nothing of a sensor is taken before that is told.
+        jump_s: of the settings: so long (s) nothing of a sensor is taken before that is reported.
     """
 
     def __init__(self, warn: Callable[[str], object], jump_s: float) -> None:
         self._warn = warn
         self._scans = self._restarts = 0
         self._untaken = Untaken(jump_s)  # by sensor
-        # By source: what is given again after a restart may be long, and is told of less and less often.
+        # By source: what is given again after a restart may be long, and is reported less and less often.
         self._again = Untaken(2.0 * jump_s, most_s=math.inf)
 
     def restart(self, message: ScanMessage, place: str) -> None:
-        """A source counts its messages anew."""
+        """A source counts its messages from the start again."""
         self._restarts += 1
         self._first(
             self._restarts,

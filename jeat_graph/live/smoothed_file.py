@@ -29,7 +29,7 @@ class SmoothedFile:
     a new one begins with the next `flush`, which is that of a checkpoint: so a checkpoint is of one file.
 
     Args:
-        path: the file; replaced, or with `keep_bytes` gone on with.
+        path: the file; replaced, or with `keep_bytes` continued.
         keep_bytes: how many bytes of it to keep, from a checkpoint; what came after them comes again. If it
             has no rows now, it was moved away since: a new one begins, with a warning.
         identities: whether rows have identities that were decided again.

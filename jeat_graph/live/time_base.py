@@ -26,7 +26,7 @@ row is believed, and its time becomes the present one, when it has at least thre
 A message is one witness, however many scans it has. The bound follows the usual pauses between scans. A jump
 to another time is none of them, so it never widens the bound; and however wide that is, nothing is passed
 over for longer than `jump_s` by a time that nobody confirms. Nothing of this asks for the clock on the wall:
-the same scans in the same order are always taken alike.
+the same scans in the same order are always taken in the same way.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Says again and again that nothing of a sensor, or of a source, is taken.
 
-One scan that is passed over is told of once, and of many only the first. But where all of a sensor's are, for
-good, somebody has to be told so: after some seconds by the scans' own times, or a hundred of them, and then
+One scan that is passed over is reported once, and of many only the first. But where all of a sensor's are,
+for good, somebody has to know: after some seconds by the scans' own times, or a hundred of them, and then
 again and again, twice as long later each time, up to a minute.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-#: First told after so many in a row that were not taken, and then at the latest after so many more.
+#: First reported after so many in a row that were not taken, and then at the latest after so many more.
 _COUNT, _MOST_COUNT = 100, 10_000
 #: Then at the latest after so long (s).
 _MOST_S = 60.0
@@ -19,13 +19,13 @@ class UntakenRun:
     """Counts what was not taken in a row.
 
     Args:
-        first_s: when it is first told of (s).
-        most_s: how much later at most it is told of again (s).
+        first_s: when it is first reported (s).
+        most_s: how much later at most it is reported again (s).
 
     Attributes:
         count: how many.
         lasted_s: how long they have gone on by their own times (s).
-        reported: whether it has been told of.
+        reported: whether it has been reported.
     """
 
     def __init__(self, first_s: float, most_s: float = _MOST_S) -> None:
@@ -39,7 +39,7 @@ class UntakenRun:
         self._t: float | None = None
 
     def untaken(self, t: float) -> bool:
-        """Note that one was not taken (its time in s); whether that is to be told of now."""
+        """Note that one was not taken (its time in s); whether that is to be reported now."""
         step_s = 0.0 if self._t is None else abs(t - self._t)
         self.count, self._t = self.count + 1, t
         if step_s <= self._first_s:  # times that jump say nothing of how long it has gone on
@@ -56,8 +56,8 @@ class Untaken:
     """Runs by name, of sensors or sources.
 
     Args:
-        first_s: when one is first told of (s).
-        most_s: how much later at most it is told of again (s).
+        first_s: when one is first reported (s).
+        most_s: how much later at most it is reported again (s).
     """
 
     #: So many names are kept at most: those that have been heard of last.
@@ -68,14 +68,14 @@ class Untaken:
         self._runs: dict[str, UntakenRun] = {}
 
     def taken(self, names: Iterable[str]) -> list[tuple[str, UntakenRun]]:
-        """Note whose were taken; returns the runs that had been told of and end now."""
+        """Note whose were taken; returns the runs that had been reported and end now."""
         if not self._runs:
             return []
         ended = [(name, self._runs.pop(name)) for name in set(names) if name in self._runs]
         return sorted((name, run) for name, run in ended if run.reported)
 
     def untaken(self, name: str, t: float) -> UntakenRun | None:
-        """Note that one was not taken (its time in s); returns its run if it is to be told of now."""
+        """Note that one was not taken (its time in s); returns its run if it is to be reported now."""
         run = self._runs.pop(name, None) or UntakenRun(self._first_s, self._most_s)
         self._runs[name] = run
         if len(self._runs) > self.MOST:

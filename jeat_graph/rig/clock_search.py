@@ -1,9 +1,9 @@
 """By how much two clocks differ, roughly, where neither the pictures nor the times are known.
 
-The same vehicle grows and shrinks alike in both pictures: the logarithms of its sizes differ by one number,
-the same for all vehicles (the ratio of the lenses), at the right difference of the clocks and at no other.
-So each difference is tried, and judged by how many vehicles of one sensor have a partner of the other's
-whose size goes along with theirs.
+The same vehicle grows and shrinks in the same way in both pictures: the logarithms of its sizes differ by one
+number, the same for all vehicles (the ratio of the lenses), at the right difference of the clocks and at no
+other. So each difference is tried, and judged by how many vehicles of one sensor have a partner of the
+other's whose size goes along with theirs.
 """
 
 from __future__ import annotations

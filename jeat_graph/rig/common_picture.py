@@ -154,7 +154,7 @@ def in_common(detections: Detections, config: Config) -> tuple[Detections, Confi
 
     Returns:
         The recording; the configuration for it, whose sensors have no way any more but the noise that theirs
-        adds; and a line for each thing that is to be said.
+        adds; and a line for each thing to be reported.
 
     Raises:
         ConfigError: as `CommonPicture.of`.

@@ -21,7 +21,7 @@ def fit_homography(points: FloatArray, there: FloatArray, weight: FloatArray | N
     Args:
         points: (N, 2) in one picture (px).
         there: (N, 2) where they are in the other (px).
-        weight: (N,) inverse standard deviations; all alike by default.
+        weight: (N,) inverse standard deviations; all the same by default.
 
     Raises:
         DataError: too few points, or all but one of them on one line.

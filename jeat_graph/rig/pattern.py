@@ -29,9 +29,9 @@ _LEAST_SIDE, _LEAST_CORNERS = 2, 6
 _CORNER_PX, _MOST_LEFT = 0.1, 0.01
 # The map must be known to this share of the picture's width over all of it.
 _MOST_UNSURE = 0.004
-# What is left beyond this (px) is said to come from places that lie in no one plane.
+# What is left beyond this (px) is reported as places that lie in no one plane.
 _ONE_PLANE_PX = 1.5
-# Corners of one place err alike: all together they count as so many points.
+# Corners of one place have the same error: all together they count as so many points.
 _POINTS_OF_A_PLACE = 4
 # Within one place corners stay where they are, to this share of the pattern's own extent.
 _STILL = 0.02
@@ -262,7 +262,7 @@ def map_of_places(
         own: width and height of the second camera's picture (px).
 
     Returns:
-        The map with covariance, and lines to be said.
+        The map with covariance, and lines to be reported.
 
     Raises:
         DataError: the corners tell no map, do not fit one, or tell it near the pattern only.

@@ -44,7 +44,7 @@ def map_of_points(
         path: where the points are from, for messages.
 
     Returns:
-        The map with covariance, and lines to be said.
+        The map with covariance, and lines to be reported.
 
     Raises:
         DataError: they tell no map, or do not fit together.

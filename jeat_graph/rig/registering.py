@@ -45,7 +45,7 @@ class Registration(NamedTuple):
     Attributes:
         way: from its picture to the other's, with covariance.
         clock: its clock, None where nothing tells.
-        lines: what is to be said of it.
+        lines: what is to be reported of it.
     """
 
     way: PictureMap
@@ -111,7 +111,7 @@ def clock_by_map(
         first: tracks of the sensor whose picture and clock are the common ones.
         second: of the other.
         way: from its picture to the first's.
-        guesses_s: rough offsets of its clock (s); by default those at which vehicles grow alike.
+        guesses_s: rough offsets of its clock (s); by default those at which vehicles grow in the same way.
         least: number of vehicles that must agree.
 
     Returns:

@@ -2,7 +2,7 @@
 
 Each sensor's error is white noise and a first-order Gauss-Markov process. Such a sum is whitened exactly by
 the innovations of a scalar Kalman filter of that process, in time that grows with the number of boxes alone:
-the filter is linear, so that residuals and columns of the Jacobian go through it alike.
+the filter is linear, so that residuals and columns of the Jacobian go through it in the same way.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ def crossing(vehicle: Vehicle, ends: FloatArray) -> Crossing | None:
 
 
 def followed_span(vehicle: Vehicle) -> tuple[float, float]:
-    """First and last time (s) at which a vehicle's place is told: up to `_BEYOND_S` beyond its fit.
+    """First and last time (s) at which a vehicle's place is reported: up to `_BEYOND_S` beyond its fit.
 
     The track has to be there, and the fit has to believe it to that end: what wanders off is not followed.
     """

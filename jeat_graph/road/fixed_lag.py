@@ -43,7 +43,7 @@ from jeat_graph.smoothers.gtsam.shared_chain import (
 )
 
 _ANY_SIZE_M = 100.0
-_SAME_S = 1e-6  # two sensors that look so closely together share a state
+_SAME_S = 1e-6  # two sensors with scans so closely together share a state
 # Of a state of the graph, in the order of the causal filter's: x, its speed, y, its speed and acceleration.
 _AS_CAUSAL = np.array([0, 1, 3, 4, 5])
 

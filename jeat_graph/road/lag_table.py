@@ -114,7 +114,7 @@ class RoadFile:
         """
         self._reported.update(reported.tolist())
         self._append(self._table.step(t, rows))
-        if len(self._reported) > self._prune_at:  # those that are gone are not remembered for ever
+        if len(self._reported) > self._prune_at:  # those that have ended are not remembered for ever
             self._reported &= self._table.held().union(reported.tolist())
             self._prune_at = max(2 * len(self._reported), _FEW)
 

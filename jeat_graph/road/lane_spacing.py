@@ -16,7 +16,7 @@ from jeat_graph.data.arrays import FloatArray, IntArray
 _TRIED_M = np.geomspace(2.0, 6.5, 120)
 _LEAST_ORDER = 0.5  # length of the mean phase vector below which there is no comb
 _CHANCE = 0.01  # of as good a comb, at any pitch tried, of vehicles that keep to no lanes (Rayleigh's test)
-_NEAR_BEST = 0.9  # of two pitches that fit alike the larger one is that of the lanes
+_NEAR_BEST = 0.9  # of two pitches that fit equally well the larger one is that of the lanes
 _LEAST_TRACKS = 4  # of the second busiest lane
 
 

@@ -1,7 +1,7 @@
 """Vehicles as they pass a line of one camera, while they drive: from the boxes of a tracker's answers.
 
 A vehicle stands on the road where the middle of its box's lower side does. Its way across the line is a
-straight one, fitted to its places within a second before and after it, so that a passage is told about a
+straight one, fitted to its places within a second before and after it, so that a passage is reported about a
 second late. Times are those of the answers.
 """
 
@@ -22,7 +22,7 @@ from jeat_graph.road.report import speed_share
 
 #: Places so long (s) before and after the line tell when and how fast it is passed.
 _REACH_S = 1.0
-#: A way across the line is told from so many places on.
+#: A way across the line is reported from so many places on.
 _LEAST_PLACES = 4
 #: A track that has had no place for longer (s) has ended.
 _ENDED_S = 3.0
@@ -30,7 +30,7 @@ _ENDED_S = 3.0
 _SAME_ERROR_S = 0.25
 #: Least standard deviations: of a place (m), and of a speed as a share.
 _LEAST_PLACE_M, _LEAST_SPEED_SHARE = 0.1, 0.01
-#: Nothing on a road moves slower (m/s) or faster where it passes a line and a time is told of it.
+#: Nothing on a road moves slower (m/s) or faster where it passes a line and a time is reported.
 _SLOWEST, _FASTEST = 0.5, 90.0
 
 
@@ -148,7 +148,7 @@ class LineWatch:
         return False
 
     def _passage(self, now: float, identity: int) -> LinePassage | None:
-        """What is to be told of a track now; one that has ended is forgotten."""
+        """What is to be reported of a track now; one that has ended is forgotten."""
         way = self._ways[identity]
         last = way.places[-1][0] if way.places else now
         ended = now - last > _ENDED_S or now < last - _ENDED_S
@@ -162,7 +162,7 @@ class LineWatch:
         return found
 
     def _fitted(self, identity: int, way: _Way) -> LinePassage | None:
-        """Fit a straight way through the places around the line; None where it is none that can be told."""
+        """Fit a straight way through the places around the line; None where none can be reported."""
         rows = np.array(way.places)
         rows = rows[np.abs(rows[:, 0] - (way.crossed or 0.0)) <= _REACH_S]
         if len(rows) < _LEAST_PLACES:
@@ -176,7 +176,7 @@ class LineWatch:
         middle = rows.mean(axis=0)
         at = middle[0] - middle[1] / across
         residual = rows[:, 1] - middle[1] - across * t
-        # Errors of neighbours are alike: so many places count as tell something new.
+        # Errors of neighbours are similar: so many places count as tell something new.
         span = float(rows[-1, 0] - rows[0, 0])
         effective = max(min(len(rows), span / _SAME_ERROR_S + 1.0), 2.0)
         place_sd = max(float(np.sqrt((residual**2).sum() / (len(rows) - 2))), _LEAST_PLACE_M)
@@ -196,7 +196,7 @@ class LineWatch:
 
     @staticmethod
     def until(t: float) -> float:
-        """Return up to which time (s) all passages have been told, once the answers have come to `t` (s)."""
+        """Return up to which time (s) all passages are reported, once the answers have come to `t` (s)."""
         return t - _ENDED_S - _REACH_S
 
     def state(self) -> list[list[Any]]:

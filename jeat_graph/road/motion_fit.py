@@ -129,7 +129,8 @@ def fit_motion(
     Args:
         t: (M,) times, ascending (s).
         xy: (M, 2) places on the road (m).
-        to_road: (M, 2, 2) metres on the road per pixel there: the error is alike in the picture.
+        to_road: (M, 2, 2) metres on the road per pixel there: the error is the same everywhere in the
+            picture.
         config: how vehicles move and points err.
         counts: (M,) how many points each is the mean of.
     """
@@ -146,7 +147,7 @@ def fit_motion(
     centre[0], centre[C] = middle
     errors = error_covariance(s, config, counts)
     inverse_px = np.linalg.inv(to_road)
-    # In the picture's metric both coordinates err alike and independently.
+    # In the picture's metric both coordinates have equal, independent errors.
     A = np.einsum("nij,njkc->nikc", inverse_px, design).reshape(n, 2, 2 * C)
     b = np.einsum("nij,nj->ni", inverse_px, xy - middle)
     size = np.sqrt(np.diag(errors))

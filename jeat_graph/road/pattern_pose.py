@@ -94,7 +94,7 @@ def map_by_pattern(
     do. Arguments are those of `camera_by_pattern`.
 
     Returns:
-        The map with covariance, and lines to be said.
+        The map with covariance, and lines to be reported.
 
     Raises:
         DataError: the places do not tell the second camera, or not well enough.

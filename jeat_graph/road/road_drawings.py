@@ -88,7 +88,7 @@ def histogram_svg(kmh: FloatArray, span: tuple[float, float], colour: str, label
 
     Args:
         kmh: (N,) speeds (km/h).
-        span: first and last speed of the axis, alike for all lanes.
+        span: first and last speed of the axis, the same for all lanes.
         colour: of the bars.
         label: what it is, for those who cannot see it.
     """

@@ -103,7 +103,7 @@ def first_state(config: MotionFitConfig, sensors: int, start: FloatArray) -> Pri
 
 
 def with_sensors(prior: PriorRows, more: int) -> PriorRows:
-    """Add the errors of further sensors to what is known of a state: none of their boxes has told of them."""
+    """Add the errors of further sensors to what is known of a state: no box of theirs has shown them yet."""
     if prior.key is None:
         return prior
     (rows, states), errors = prior.A.shape, CHANNELS * more

@@ -4,7 +4,7 @@ The boxes of a track, were its vehicle as large as vehicles of its kind are on a
 width and height in the picture. Over many vehicles the boxes' sizes over those tell the scale. A box is as
 high as its vehicle is long and high, each by the angle of the view: boxes near and far tell that angle, too.
 It is the last resort: cars are not the same in all countries, boxes hold mirrors or leave bumpers out, and
-all vehicles of a road err alike. So mean length, width and height are each believed no more than
+all vehicles of a road have the same error. So mean length, width and height are each believed no more than
 `CalibrationConfig.size_log_sd` says.
 """
 
@@ -103,7 +103,7 @@ def _likelihood(log: FloatArray, variance: FloatArray) -> tuple[FloatArray, Floa
     """Logarithms (..., K, C) of each vehicle's odds as each kind, and its mean squared distance from it."""
     seen = np.isfinite(log)
     squared = np.where(seen, log, 0.0) ** 2 / variance
-    # The same vehicle in several places is off alike: it counts once.
+    # The same vehicle has the same error in several places: it counts once.
     count = np.maximum(seen.sum(axis=(-2, -1)), 1)
     distance = squared.sum(axis=(-2, -1)) / count
     logs = np.where(seen, np.log(variance), 0.0).sum(axis=(-2, -1)) / count

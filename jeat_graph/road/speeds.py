@@ -46,7 +46,7 @@ class Speed(NamedTuple):
     Attributes:
         kmh: the estimate (km/h).
         noise_kmh: standard deviation by this vehicle's own errors (km/h).
-        calibration_kmh: standard deviation by what is wrong for all vehicles of a camera alike (km/h).
+        calibration_kmh: standard deviation by what is equally wrong for all vehicles of a camera (km/h).
         low_kmh: lower end of the 95 % interval, not below zero (km/h).
         high_kmh: its upper end (km/h).
     """
@@ -58,7 +58,8 @@ class Speed(NamedTuple):
     high_kmh: float
 
 
-#: A speed is not told where its 95 % interval reaches farther than this, and than this share of the speed.
+#: A speed is not reported where its 95 % interval reaches farther than this, and than this share of the
+#: speed.
 _MOST_REACH_KMH, _MOST_REACH_SHARE = 10.0, 0.5
 UNKNOWN_SPEED = Speed(math.nan, math.nan, math.nan, math.nan, math.nan)
 

@@ -86,7 +86,7 @@ def count_columns(result: RoadResult, config: SummaryConfig) -> dict[str, npt.ND
     which `observed` (per cent) is the share; NaN where it covers less than 10 s.
 
     The intervals of the speeds are for the vehicles that were there: by noise of each and by the calibration,
-    which is wrong for all of them alike.
+    which is equally wrong for all of them.
     """
     found = passages(result)
     groups: dict[Group, dict[int, list[Passage]]] = {Group(line, ALL, ALL, ALL): {} for line in result.lines}

@@ -107,7 +107,7 @@ def _exactly(
     first: Detections, second: Detections, offset_s: float, latest_s: float | None
 ) -> Generator[None, None, FoundClock]:
     """Find the offset, known roughly, to the millisecond by the motion of vehicles that both saw."""
-    # Both are tracked for as long as both look, but no longer than is needed.
+    # Both are tracked for as long as both have scans, but no longer than is needed.
     begin = max(first.scan_t[0], second.scan_t[0] - offset_s)
     end = min(first.scan_t[-1], second.scan_t[-1] - offset_s)
     if latest_s is None:

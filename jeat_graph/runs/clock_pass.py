@@ -40,7 +40,7 @@ def find_clocks(
 
     Returns:
         The recording; by sensor `lag_s` and `std_s` of what was taken off; and a line for each thing that is
-        to be said.
+        to be reported.
 
     Raises:
         DataError: two sensors see the same part of the picture and contradict each other.
@@ -85,7 +85,7 @@ def with_clocks(
 
     Returns:
         The configuration, with `latency_s` of the sensors that are late in all recordings by the same; and a
-        line for each thing that is to be said.
+        line for each thing to be reported.
 
     Raises:
         DataError: as `find_clocks`.

@@ -45,7 +45,7 @@ def check_clocks(detections: Detections, config: Config, names: str) -> list[str
             continue
         shown = (before[1] - before[0]) + (after[1] - after[0])
         seen = (
-            f"{names}: sensor {after[2]!r} looks from {exact_text(after[0])} to {exact_text(after[1])} s, "
+            f"{names}: sensor {after[2]!r} scans from {exact_text(after[0])} to {exact_text(after[1])} s, "
             f"{before[2]!r} from {exact_text(before[0])} to {exact_text(before[1])} s"
         )
         if gap > max(_GAP_FACTOR * shown, _LEAST_GAP_S):

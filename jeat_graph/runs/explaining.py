@@ -32,7 +32,7 @@ class TrackMoment(NamedTuple):
         other: the most probable other hypothesis, in words.
         reported: whether the causal table has the track.
         visible: probability that it is there and not hidden.
-        unseen_s: time since the last detection that told that it was there (s).
+        unseen_s: time since the last detection that confirmed it (s).
     """
 
     t: float

@@ -1,4 +1,4 @@
-"""Do these detections fit this configuration? What does not is said before the tracker starts."""
+"""Do these detections fit this configuration? What does not is reported before the tracker starts."""
 
 from __future__ import annotations
 

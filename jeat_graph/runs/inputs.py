@@ -35,7 +35,7 @@ def describe_inputs(paths: Sequence[str | Path]) -> list[dict[str, Any]]:
 
 
 def check_distinct(items: Sequence[str | Path]) -> None:
-    """Refuse a file that is given twice: its boxes would be taken for two looks of one sensor.
+    """Refuse a file that is given twice: its boxes would be taken for two scans of one sensor.
 
     Two sensors may have files of one content, such as empty ones, where `NAME=path` tells them apart.
 

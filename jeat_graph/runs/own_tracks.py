@@ -42,7 +42,7 @@ def own_tracks_in_steps(
     yield
     for k, batch in enumerate(detections.batches()):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of what is odd in the input the caller has told
+            warnings.simplefilter("ignore")  # of what is odd in the input the caller has reported already
             tracker.step(batch)
         if k % _SCANS_PER_DRAIN == 0:
             parts.append(tracker.drain_smoothed())

@@ -35,7 +35,7 @@ from jeat_graph.tracking.tracker import Tracker
 STEPS_PER_DRAIN = 256
 #: So many before the state is saved (some ten seconds of work); a shorter run is not worth it.
 STEPS_PER_SAVE = 40 * STEPS_PER_DRAIN
-# Of so many detections most belong to vehicles: a smaller share than this in tracks is said aloud.
+# Of so many detections most belong to vehicles: a smaller share than this in tracks is a warning.
 _MANY, _LEAST_TRACKED = 100, 0.05
 
 

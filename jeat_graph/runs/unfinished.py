@@ -1,6 +1,6 @@
 """The state of a run that is not finished, kept in its folder so that a crash costs some seconds of work.
 
-Beside the tracker's state there is a log of all rows so far. A run that goes on writes its tables anew from
+Beside the tracker's state there is a log of all rows so far. A run that goes on writes its tables again from
 the log, then goes on from the state: its files are, byte for byte, those of a run that was never broken off.
 """
 

@@ -7,8 +7,8 @@ with means of their own and one variance. The logarithm of their likelihood rati
 cosine (Fisher, "The use of multiple measurements in taxonomic problems", Annals of Eugenics 7, 1936).
 Embeddings that tell nothing come to count for nothing.
 
-The ratio speaks for one vehicle against another. It says nothing of false boxes, which look alike too: so it
-decides who takes a detection, and not whether there is a vehicle.
+The ratio speaks for one vehicle against another. It says nothing of false boxes, which look similar too: so
+it decides who takes a detection, and not whether there is a vehicle.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from jeat_graph.data.scan import Scan
 from jeat_graph.tracking.by_track import carried_over, places
 
 _KEPT = 0.9  # of a track's mean from one detection to the next
-# Before anything was seen, cosines of one vehicle and of two are alike: this many of each, spread so widely.
+# Before anything was seen, cosines of one vehicle and of two are the same: this many of each, spread so
+# widely.
 _PRIOR_WEIGHT, _PRIOR_STD = 20.0, 0.2
 _MOST_WEIGHT = 4096.0  # of cosines that are remembered; then all count half
 _SAME, _OTHER = 0, 1

@@ -43,7 +43,7 @@ class CoreModel(OneModel):
         known = config.input.picture == "given"
         size = (float(config.image.width), float(config.image.height)) if known else (1.0, 1.0)
         by_records = by_gtsam(config)
-        # What GTSAM smooths is recorded only; the core's own pass is never told of it.
+        # What GTSAM smooths is recorded only; the core's own pass never gets it.
         self._model = core.Model(constants, *size, known, math.inf if by_records else lag_of(config))
         super().__init__(constants, config, by_records)
 

@@ -29,7 +29,7 @@ class StepInput(NamedTuple):
 
     Attributes:
         t: time (s).
-        sensors: (K,) indices of the sensors that look, ascending.
+        sensors: (K,) indices of the sensors with a scan, ascending.
         numbers: (K,) of boxes of each.
         boxes: (M, 4) left, top, width, height (px), sensor by sensor.
         scores: (M,) of them.
@@ -187,7 +187,7 @@ class TrackEngine(Protocol):
         ...
 
     def predicted(self, t: float) -> tuple[ModelRows, FloatArray]:
-        """Return these tracks at a later time (s), and the covariances (N, 2, 5, 5) of what is told."""
+        """Return these tracks at a later time (s), and the covariances (N, 2, 5, 5) of what is reported."""
         ...
 
     def last_scans(self) -> FloatArray:

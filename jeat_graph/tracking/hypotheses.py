@@ -26,7 +26,7 @@ class Hypotheses(NamedTuple):
         log_odds: (N,) of being real, as the tracker has it.
         terms: their sum is `log_odds`, but for what was learnt since the last step.
         visible: (N,) probability that the object is there and not hidden.
-        unseen_s: (N,) time since the last detection that told that it was there (s).
+        unseen_s: (N,) time since the last detection that confirmed it (s).
         detections: (N,) number of its detections.
         reported: (N,) whether the tables have it.
     """

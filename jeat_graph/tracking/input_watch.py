@@ -17,7 +17,7 @@ from jeat_graph.io.tables.time_units import LONGEST_STEP_S, likely_unit
 
 #: Boxes after which a first opinion is formed, and after which the watch ends.
 FIRST_BOXES, LAST_BOXES = 20, 200
-#: Boxes after which corners that can be nothing else are told of.
+#: Boxes after which corners that can be nothing else are reported.
 CORNER_BOXES = 3
 #: Scans of one sensor by which its step is judged.
 STEP_SCANS = 6
@@ -32,7 +32,7 @@ _FOLLOWS = 0.5
 
 
 _counted: ContextVar[bool] = ContextVar("outside_counted", default=False)
-#: What is said of boxes that are no left, top, width, height.
+#: The message about boxes that are no left, top, width, height.
 CORNERS = (
     "boxes look like x1, y1, x2, y2, taken for left, top, width, height: name the columns so, or convert "
     'them (in Python format="xyxy" of Tracker.update, or Scan.from_xyxy)'
@@ -74,7 +74,7 @@ def only_corners(boxes: FloatArray, width: float, height: float) -> bool:
     return bool(fit and ((corner + far).max(axis=0) > (_OVER_EDGE * width, _OVER_EDGE * height)).any())
 
 
-#: What is said of boxes in shares of the picture.
+#: The message about boxes in shares of the picture.
 SHARES = "all boxes lie in [0, 1]: they must be in px, not in shares of the picture"
 
 
@@ -85,7 +85,7 @@ def look_like_shares(boxes: FloatArray) -> bool:
 
 @contextmanager
 def outside_counted() -> Iterator[None]:
-    """Within this a recording is tracked whose boxes outside the picture have been told of already."""
+    """Within this a recording is tracked whose boxes outside the picture have been reported already."""
     token = _counted.set(True)
     try:
         yield

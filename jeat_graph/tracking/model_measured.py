@@ -1,4 +1,4 @@
-"""What the boxes of a step said of their tracks: diagnostics, and records for other smoothers."""
+"""What the boxes of a step say of their tracks: diagnostics, and records for other smoothers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A step that has been taken, before the smoothers are told of it."""
+"""A step that has been taken, before the smoothers get it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jeat_graph.tracking.identities.passes import Pass
 
 
 class PendingStep(NamedTuple):
-    """A step that the smoothers are to be told of when nothing can come before it any more.
+    """A step that the smoothers are to get when nothing can come before it any more.
 
     Attributes:
         record: the engine's, of N tracks.

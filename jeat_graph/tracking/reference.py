@@ -57,7 +57,7 @@ from jeat_graph.tracking.reference_state import ReferenceState, ReferenceTracks,
 _PERIOD_MEMORY = 0.9
 # Tracks that show the camera's motion: really there, with so many detections, the last so recent (s).
 _CAMERA_DETECTIONS, _CAMERA_AGE_S = 2, 0.5
-# A pair that is possible is so however little it looks alike.
+# A pair that is possible is so however low the similarity.
 _LEAST_GAIN = 1e-9
 
 
@@ -307,7 +307,7 @@ def by_owner(ratio: FloatArray, owner: IntArray, owners: IntArray | None) -> Flo
 
 
 def by_appearance(ratio: FloatArray, similarity: FloatArray | None) -> FloatArray:
-    """Return ln L (N, M) with what looks say: who takes a box, and not whether there is an object."""
+    """Return ln L (N, M) with what appearance says: who takes a box, and not whether there is an object."""
     if similarity is None:
         return ratio
     out = ratio.copy()

@@ -116,7 +116,7 @@ def judge(state: ReferenceState, c: ModelConstants) -> None:
 
 
 def count_false_boxes(state: ReferenceState, sensor: int, assigned: IntArray, c: ModelConstants) -> None:
-    """Keep the mean number of a sensor's boxes a scan that are of nothing real, by their takers (M,)."""
+    """Keep the mean number of a sensor's boxes a scan that are of nothing real, by their tracks (M,)."""
     real = state.tracks.real[np.searchsorted(state.tracks.track_id, assigned)]
     mean = c.clutter_memory * state.false_boxes[sensor] + (1.0 - c.clutter_memory) * (1.0 - real).sum()
     state.false_boxes[sensor] = mean

@@ -27,7 +27,7 @@ from jeat_graph.tracking.reference_state import ReferenceState, SensorScan, decl
 
 
 class Answer(NamedTuple):
-    """What the last step told; see the methods of `ReferenceModel`."""
+    """The output of the last step; see the methods of `ReferenceModel`."""
 
     rows: ModelRows
     states: tuple[FloatArray, FloatArray]
@@ -243,7 +243,7 @@ def _later(track_id: IntArray, assigned: IntArray, owners: FloatArray | None) ->
 
 
 def _no_answer() -> Answer:
-    """Return what is told before the first step."""
+    """Return the output before the first step."""
     nothing, whole = np.zeros(0), np.zeros(0, np.int64)
     states = np.zeros((0, 2 * STATES)), np.zeros((0, 2 * STATES**2))
     return Answer(joined([]), states, whole, whole, (nothing, nothing, nothing))

@@ -128,7 +128,7 @@ class ReferenceTracks(ArrayTable):
 
 
 class SensorScan(NamedTuple):
-    """One look of a sensor.
+    """One scan of a sensor.
 
     Attributes:
         sensor: its index.

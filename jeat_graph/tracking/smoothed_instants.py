@@ -32,7 +32,7 @@ class SmoothedInstants:
         self._wanted: deque[float] = deque()
 
     def note(self, t: float) -> None:
-        """Take note of a step that the smoother is told of; in order of time."""
+        """Take note of a step that the smoother gets; in order of time."""
         if self._rate_hz <= 0.0:
             return
         interval = math.floor(t * self._rate_hz + _ROUNDING)

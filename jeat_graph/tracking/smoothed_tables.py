@@ -140,7 +140,7 @@ class SmoothedTables:
     def _decide_later(
         self, batch: tuple[list[Scan], Pass, FloatArray] | None, ids: IntArray, given: IntArray | None
     ) -> None:
-        """Have identities of a step that the smoother was told of be decided with a lag, if they are.
+        """Have identities of a step that the smoother got be decided with a lag, if they are.
 
         Args:
             batch: its scans, which tracks took their detections, and how far the camera had moved (2,) (px).

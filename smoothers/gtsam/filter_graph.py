@@ -1,13 +1,13 @@
 """The factor graph of tracks, for whoever wants to see it, add to it and solve it: GTSAM's own objects.
 
-Each record of a track is a key, x0, x1, … of track 0, x1000000, … of track 1; records of sensors that look
-at one and the same time share one. Its value is a vector of both axes' states, one after the other, in the
-units of the filter: place (px), velocity (px/s), acceleration (px/s²), and what else the filter's state has
-(ln size, its rate). Factors are
+Each record of a track is a key, x0, x1, … of track 0, x1000000, … of track 1; records of sensors that have a
+scan at one and the same time share one. Its value is a vector of both axes' states, one after the other, in
+the units of the filter: place (px), velocity (px/s), acceleration (px/s²), and what else the filter's state
+has (ln size, its rate). Factors are
 
 - a prior on the first state of each track: the box that began it,
 - motion between neighbouring states, a camera's included, with the process noise that the filter took,
-- measurements: what each box told of the state, as rows A x = b of unit noise.
+- measurements: what each box says of the state, as rows A x = b of unit noise.
 
 All are linear: motion and measurements as the filter linearised them. So one step of Gauss-Newton solves
 them, and the solution is what whole-track smoothing gives. Elimination must be by QR, as steps of

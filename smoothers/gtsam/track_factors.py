@@ -2,8 +2,8 @@
 
 A record has the state before and after an update, m⁻, P⁻ and m, P, and the transition F from the record
 before. With P⁻ = L⁻ L⁻ᵀ and P = L Lᵀ, motion has the noise P⁻ − F P Fᵀ = L⁻ (I − C Cᵀ) L⁻ᵀ, C = L⁻⁻¹ F L, and
-a measurement has turned a unit covariance into B Bᵀ, B = L⁻⁻¹ L': with its singular values √μ it told 1/μ − 1
-along each singular vector. Both are exact whatever the measurements were.
+a measurement has turned a unit covariance into B Bᵀ, B = L⁻⁻¹ L': with its singular values √μ it gave the
+information 1/μ − 1 along each singular vector. Both are exact whatever the measurements were.
 
 Rows are on ξ, x = m + L ξ, where m and L are the filter's at that state. So each state has a scale of its own
 and is counted from where the filter had it: all numbers are about 1, be a step a microsecond or five minutes
@@ -23,7 +23,8 @@ from jeat_graph.smoothers.filtered_track import FilteredTrack
 #: rounding: of a step of microseconds P⁻ − F P Fᵀ has no more digits. It is taken to be this: what a record
 #: adds to the variance of the smoothed states is as small.
 LEAST_NOISE = 1e-12
-# Of a measurement that told less, in units of what was known before, nothing is left but rounding.
+# Of a measurement that gave less information, in units of what was known before, nothing is left but
+# rounding.
 _LEAST_PRECISION = 1e-12
 # A pivot is at least this share of its variance.
 _LEAST_PIVOT = 1e-15

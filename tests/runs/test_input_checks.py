@@ -128,7 +128,7 @@ def test_sensors_of_different_clocks_are_refused_and_the_setting_that_is_named_m
     path = written(tmp_path, two_sensors(1.7e9, 0.0))
     assert main(["track", path, "--out", str(tmp_path / "run")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "sensor 'rgb' looks from 1700000000 to" in line
+    assert "sensor 'rgb' scans from 1700000000 to" in line
     assert "'evt' from 0 to 0.45 s: they have different clocks" in line
     setting = "sensors.rgb.latency_s=1700000000"
     assert f"--set {setting}," in line

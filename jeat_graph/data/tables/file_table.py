@@ -288,7 +288,7 @@ class FileTable:
 
 
 def advice_on(text: str) -> str:
-    """Say what to do about a field that is no number, where that can be told."""
+    """Say what to do about a field that is no number, where that is known."""
     if re.fullmatch(r"\s*[\d.,]+\s*%\s*", text):
         return "; leave the sign away, and give --score-scale percent"
     return ""

@@ -27,7 +27,7 @@ MORE_COLUMNS = (*RUN_CLASSES, *SIZE_VAR, *RUN_IDENTITIES)
 #: Columns of another tracker's result, or others that can stand for them, and those that it may have.
 RESULT_COLUMNS = ("t", "object_id", *BOX)
 MORE_RESULT_COLUMNS = ("score", *ASIDE)
-#: What is said of boxes without identities.
+#: The message about boxes without identities.
 NO_IDENTITIES = (
     "has no identities (a column or field such as track_id); if these are detections, run `jeat-graph track` "
     "on them first and give the run directory that it writes"

@@ -32,7 +32,7 @@ def choose(
         wanted: numbers of the classes that are kept, None for all.
         score: those below are left out.
         overlap: of two of one class that overlap by more (intersection over union) the better stays; not
-            where the network has told them apart itself (`found.distinct`).
+            where the network has distinguished them itself (`found.distinct`).
         average: and becomes the mean, weighed by their scores, of all of its class that overlap it by at
             least so much: several cells of a network say where a vehicle is, each with an error of its own.
             1: it stays as it is. Source: box voting, Gidaris and Komodakis, "Object detection via a

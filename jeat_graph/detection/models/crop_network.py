@@ -72,7 +72,7 @@ class NetworkEmbedder:
 
     Args:
         path: the ONNX file.
-        settings: what is said instead.
+        settings: what is declared instead.
 
     Attributes:
         description: one line that says how it is fed.

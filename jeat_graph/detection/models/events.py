@@ -34,7 +34,7 @@ class ModelEventDetector(BinnedDetector):
     that `train` made is shown the camera's picture as large as its input allows; of others a picture that is
     smaller is filled up with zeros at the right and below. Further inputs are its memory: each has an
     output of the same shape, in the same order, which is given back with the next window; it begins with
-    zeros. An input `elapsed` (1, 1) is told how much time has passed since the window before (s), and at the
+    zeros. An input `elapsed` (1, 1) gets how much time has passed since the window before (s), and at the
     first the length of the window.
 
     Args:

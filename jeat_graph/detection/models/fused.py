@@ -1,6 +1,6 @@
 """A network that finds vehicles in pictures and events of the same pixels at once, with a memory of its own.
 
-It looks at each window of events with the newest picture there is, and is told how old that is; without
+It looks at each window of events with the newest picture there is, and gets how old that is; without
 pictures, or without events, it does with the others.
 """
 

@@ -89,7 +89,7 @@ class MovieWriter(PiecewiseWriter):
             self._ffmpeg.write(rgb)
             return
         picture = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
-        quietly(lambda: self._sink.write(picture))  # a full disk is told of once, at the end
+        quietly(lambda: self._sink.write(picture))  # a full disk is reported once, at the end
 
 
 def write_png(path: str | Path, rgb: RgbImage) -> None:

@@ -88,7 +88,7 @@ def open_event_camera(
     """
     kind = event_cameras()[address.kind]
     clock = _OnOurClock(kind, now or WallClock())
-    # A still scene makes no events: that is no reason to connect anew.
+    # A still scene makes no events: that is no reason to connect again.
     return LiveReader(
         address.shown,
         lambda: _LiveEvents(kind, address, clock),

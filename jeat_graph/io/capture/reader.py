@@ -73,7 +73,7 @@ class LiveReader(Generic[Item]):
     """Reads a camera until it is closed; a context manager.
 
     The connection is made, and made again when it breaks off, for as long as it takes, with growing pauses;
-    each of this is told in a line. Who takes the items more slowly than they come gets the newest ones.
+    each of this is reported in a line. Who takes the items more slowly than they come gets the newest ones.
 
     Args:
         name: address of the camera, as it may be shown.

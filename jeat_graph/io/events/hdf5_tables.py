@@ -1,6 +1,6 @@
 """Events in HDF5 without an index by time: eTraM, 1 Mpx, M3ED, MVSEC, v2e, e2vid, MATLAB 7.3 and others.
 
-Which data sets are events is told by names and shapes (`array_tables`), not by a list of data sets; the
+Which data sets are events is recognised by names and shapes (`array_tables`), not by a list of data sets; the
 picture's size is looked for where these files have it.
 """
 

@@ -207,7 +207,7 @@ def unit_of(
 
 
 def _since_1970(median: float, whole: bool) -> str | None:
-    """The unit in which a time is one since 1970; of whole milliseconds it is not told from microseconds."""
+    """The unit in which a time is one since 1970; whole milliseconds are taken for microseconds."""
     units = ("us", "ns") if whole else ("s",)
     for unit in units:
         if _EPOCH_S <= median / PER_SECOND[unit] < _LAST_EPOCH_S:

@@ -15,7 +15,7 @@ from jeat_graph.io.files.limits import check_room
 
 
 class NpzMember:
-    """An array in a zip archive; rows are read one after the other, and from the first one anew.
+    """An array in a zip archive; rows are read one after the other, and from the first one again.
 
     Args:
         path: the archive.

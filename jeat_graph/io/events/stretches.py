@@ -83,7 +83,7 @@ class IndexedStretches(EventFile):
 
 
 class ForwardStretches:
-    """Reads a file forwards and keeps what may still be asked for; a step back reads it anew.
+    """Reads a file forwards and keeps what may still be asked for; a step back reads it from the start.
 
     Args:
         path: the file; the others, and errors, as of `open_stretches`.

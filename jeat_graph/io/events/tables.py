@@ -63,7 +63,7 @@ class EventTable:
     Attributes:
         kind: what the file is, such as `text`.
         names: of the columns; None where they have none.
-        blocks: begins to read the table anew.
+        blocks: begins to read the table again.
         size_px: width and height of the picture, where the file says.
         likely_unit: the unit of time that the layout stands for, if any.
         t_offset_us: what to add to the times for the clock of other files (µs).

@@ -22,8 +22,8 @@ class TextHead(NamedTuple):
     Attributes:
         start: bytes before the first event.
         lines: lines before it.
-        names: of the columns, if they are said.
-        size_px: width and height, if they are said.
+        names: of the columns, if the file says them.
+        size_px: width and height, if the file says them.
         delimiter: between two fields.
         words: for each column, whether its fields are words, such as `True`.
     """

@@ -104,7 +104,7 @@ class WordReader(EventReader):
                     out = _room()
                 if state.waits:
                     state.waits = False
-                    rest = words[used:].copy()  # the block's memory is filled anew
+                    rest = words[used:].copy()  # the block's memory is filled again
                     break
         self._judge()
         if state.filled or state.triggers:

@@ -6,7 +6,7 @@ _EVENTS = "is a file of events, no table; `detect` and `track` take it as --even
 _VIDEO = "is a video, no table; `detect` and `track` take it as --frames"
 _PICTURE = "is a picture, no table; `detect` and `track` take a folder of them as --frames"
 _PICKLE = "is a pickle, which can run programs and is not read; save it as Parquet or CSV"
-#: What is said of XML, which annotation tools write in many forms.
+#: The message about XML, which annotation tools write in many forms.
 XML = (
     "is XML (Pascal VOC, or CVAT's own), which is not read: export it as MOT 1.1, COCO or YOLO from the "
     "program that wrote it"

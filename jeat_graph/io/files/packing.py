@@ -3,7 +3,7 @@
 For files that hold the state of a running program. Of objects only those of classes that the caller names are
 taken, attribute by attribute; nothing in a file can name another class or run anything.
 
-What is alike is packed together, column by column: the same attribute of many objects is one piece, and so
+What is similar is packed together, column by column: the same attribute of many objects is one piece, and so
 are many arrays of one kind. So the cost is that of the kinds of things there are, hardly of their number.
 """
 
@@ -153,7 +153,7 @@ class _Packer:
 
 
 def _runs(values: Sequence[Any]) -> Any:
-    """Plain values, shorter where all are alike."""
+    """Plain values, shorter where all are the same."""
     first = values[0]
     if values[-1] == first and all(value == first for value in values):
         return {"same": [len(values), first]}

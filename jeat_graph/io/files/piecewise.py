@@ -10,7 +10,7 @@ from typing import Self
 class PiecewiseWriter:
     """A context manager: `_begin` opens, `_finish` writes what is left unless something went wrong.
 
-    What `_begin` enters on the stack is told of any error, also of one of `_finish`, and can undo its work.
+    What `_begin` enters on the stack gets any error, also of one of `_finish`, and can undo its work.
     """
 
     def __init__(self) -> None:

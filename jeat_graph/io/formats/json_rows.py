@@ -119,7 +119,7 @@ def _arrow(values: list[Any]) -> Any:
 
 
 def _declared_rate(rows: list[dict[str, Any]]) -> float | None:
-    """Frames per second (Hz) that all objects say alike; None where they do not."""
+    """Frames per second (Hz) that all objects agree on; None where they do not."""
     for key in _RATES:
         rates = {row.get(key) for row in rows if isinstance(row.get(key), int | float)}
         if len(rates) == 1 and (rate_hz := float(next(iter(rates)) or 0.0)) > 0.0:

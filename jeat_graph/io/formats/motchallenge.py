@@ -4,11 +4,12 @@ Frame k is at time (k - 1) / rate; or at k / rate in a file that has a frame 0. 
 it is the caller's, or that of the `seqinfo.ini` that MOTChallenge keeps beside (or in the folder above) its
 text files.
 
-What stands in columns 8 and up differs by year and is told by their number: with 9 columns the file is of
-2016 or later and column 8 is the class and 9 the visibility; with 10 columns, 8 to 10 are world coordinates,
-often -1, and there is no class, unless 8 holds whole numbers and 9 and 10 only marks. With 11 columns there
-is a class beside the world coordinates: in column 8, or in the last one if 8 has no whole numbers from 0 up.
-Column 7 is a detection's confidence; in truth, 0 there marks an object that is not to be judged.
+What stands in columns 8 and up differs by year and is recognised by their number: with 9 columns the file is
+of 2016 or later and column 8 is the class and 9 the visibility; with 10 columns, 8 to 10 are world
+coordinates, often -1, and there is no class, unless 8 holds whole numbers and 9 and 10 only marks. With 11
+columns there is a class beside the world coordinates: in column 8, or in the last one if 8 has no whole
+numbers from 0 up. Column 7 is a detection's confidence; in truth, 0 there marks an object that is not to be
+judged.
 """
 
 from __future__ import annotations

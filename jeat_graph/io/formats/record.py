@@ -93,7 +93,7 @@ class Certainty(IntEnum):
     POSSIBLE = 1
     #: Its content looks so.
     BY_CONTENT = 2
-    #: Its content looks so, and files of another format that look alike too do not.
+    #: Its content looks so, and that of no similar format.
     BY_EXACT_CONTENT = 3
     #: Its name ends so.
     NAMED = 4
@@ -103,7 +103,7 @@ class Certainty(IntEnum):
 
 @dataclass(frozen=True)
 class FileHead:
-    """The beginning of a file, by which its format is told.
+    """The beginning of a file, by which its format is recognised.
 
     Attributes:
         path: the file, or the folder.

@@ -26,7 +26,7 @@ def is_aedat4(path: Path) -> bool:
 
 
 class Aedat4Decoder(Decoder):
-    """Frames of an AEDAT 4 file; steps forward are fast, a step back reads it anew.
+    """Frames of an AEDAT 4 file; steps forward are fast, a step back reads it from the start.
 
     A frame's time is the middle of its exposure, or what the file says where it has no exposure.
 

@@ -145,7 +145,7 @@ def _csv_row(text: str, form: CsvForm, name: str, number: int, how: StreamReadin
     if not any(fields):
         return None
     value = {column: unguarded(fields[k]) if k < len(fields) else "" for column, k in place.items()}
-    # Each row is checked by itself, so that its line can be named; one without area stays, as a look.
+    # Each row is checked by itself, so that its line can be named; one without area stays, as a scan.
     try:
         row = _row_of(value, form, how)
         # Of classes everything is taken: they would only cost time here.

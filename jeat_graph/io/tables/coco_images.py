@@ -120,7 +120,7 @@ def _frame_number(image: Mapping[str, Any], named: Mapping[int, int]) -> float:
 def _numbers_in_names(images: list[dict[str, Any]]) -> dict[int, int]:
     """Frame number in the file name of each image, by its id; empty unless the names number the frames.
 
-    They do where no image says its frame or time, all are called alike but for a number, and no number is
+    They do where no image says its frame or time, all names differ by a number only, and no number is
     there twice. A name then says when a picture was taken, an id only which it is.
     """
     parts = {image["id"]: split_picture_name(str(image.get("file_name", ""))) for image in images}

@@ -14,7 +14,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.tables.spreadsheets import is_number
 
 _MOST_COLUMNS = 10_000
-# Columns that people's tables may well have others beside which are called much alike.
+# Columns that people's tables may well have others beside them under similar names.
 _NO_SLIP = ("class_id", "name", "video", "image", "box")
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 

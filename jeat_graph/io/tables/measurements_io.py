@@ -1,6 +1,6 @@
 """The detections that confirmed tracks took in, `measurements.parquet`: each as the filter weighed it.
 
-With them a run can be smoothed anew in other ways without tracking its recording again.
+With them a run can be smoothed again in other ways without tracking its recording again.
 """
 
 from __future__ import annotations

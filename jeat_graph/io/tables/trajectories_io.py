@@ -1,7 +1,7 @@
 """Trajectory tables from and to files: the run's own tables; results of other trackers are read too.
 
 A run's table keeps times to the last bit, boxes and motion to 0.001 px (px/s, px/s²), existence to 1e-6 and
-variances to six significant digits, in CSV and Parquet alike; the same table gives the same bytes.
+variances to six significant digits, in CSV as in Parquet; the same table gives the same bytes.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ class Cameras:
     Args:
         config: of the service.
         status: of the service.
-        log: takes what is to be said.
+        log: takes what is to be reported.
         stack: closes them.
 
     Raises:
@@ -81,7 +81,7 @@ class Cameras:
         return self._opened[0][0].size_px if self._opened else None
 
     def settings(self, log: Log) -> list[str]:
-        """Return what the tracker's configuration is told of the detectors, as `key=value`."""
+        """Return what is declared to the tracker's configuration of the detectors, as `key=value`."""
         found = []
         for camera, sensor in self._opened:
             for text in declared_settings(camera.request, log.say):

@@ -41,7 +41,7 @@ class PassageWatch:
         self._until = -math.inf
 
     def begin(self, state: Any) -> None:
-        """Go on from a checkpoint's state, or start over; who was told before may be told again."""
+        """Go on from a checkpoint's state, or start over; who was reported before may be reported again."""
         with self._lock:
             self._line = self._new_line()
             if state is not None:
@@ -66,7 +66,7 @@ class PassageWatch:
             return {"line": self._line.state(), "kept": [list(one) for _, one in self._kept]}
 
     def drain(self) -> tuple[list[LivePassage], float]:
-        """Return who has passed since this was asked last, and up to which time (s) all have been told."""
+        """Return who has passed since this was last asked, and up to which time (s) all are reported."""
         with self._lock:
             found = [one for number, one in self._kept if number > self._drained]
             self._drained = self._number
@@ -86,7 +86,7 @@ def _passage(one: LinePassage) -> LivePassage:
 
 
 def _words(error: Exception) -> str:
-    """What is said of an error; of a fault of the program its kind, too."""
+    """The message of an error; of a fault of the program its kind, too."""
     known = isinstance(error, (JeatGraphError, OSError))
     return str(error) if known else f"{type(error).__name__}: {error}"
 

@@ -42,7 +42,7 @@ class CorridorService:
 
     Args:
         config: of the service.
-        log: takes what is to be said.
+        log: takes what is to be reported.
         sets_aside_damaged: whether a damaged checkpoint is renamed and started over; or refused.
 
     Attributes:
@@ -152,7 +152,7 @@ class CorridorService:
             sinks.line(json.dumps(event))
 
     def _save(self, sinks: Sinks) -> None:
-        """Write who is on the way to the disk; what was told has arrived before."""
+        """Write who is on the way to the disk; what was reported has arrived before."""
         sinks.flush()
         path = self._config.checkpoint
         if path is None:

@@ -72,7 +72,7 @@ class Service:
 
     Args:
         config: of the service.
-        log: takes what is to be said.
+        log: takes what is to be reported.
         sets_aside_damaged: whether a damaged checkpoint is renamed and the tracker starts over; or refused.
         interrupts: of the process, if it does more than this.
         watcher: is shown all answers, and has its state in the checkpoint.
@@ -229,7 +229,7 @@ class Service:
         path = state.checkpoint
         if path is not None and Path(path).is_file():
             try:
-                # Without settings it is only looked whether the file can be gone on from at all.
+                # Without settings it is only looked whether the file can be continued at all.
                 live, more = LiveTracker.load(path, settings)
                 if live.policy != late:
                     raise ConfigError(f"{path}: was saved with late: {live.policy}, not {late}")
@@ -252,7 +252,7 @@ class Service:
         return None
 
     def _smoothed_file(self, path: str, keep_bytes: int | None, live: LiveTracker) -> SmoothedFile:
-        """The file of smoothed rows; one that is not gone on with is renamed, never overwritten."""
+        """The file of smoothed rows; one that is not continued is renamed, never overwritten."""
         decided = live.tracker.config.smoother.identities == "lag"
         try:
             if keep_bytes is not None or not has_rows(path):

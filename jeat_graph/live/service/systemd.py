@@ -1,4 +1,4 @@
-"""What systemd is told by its own socket: that the service is ready, alive, and about to stop."""
+"""What systemd gets by its own socket: that the service is ready, alive, and about to stop."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def _reach(client: Any, address: Address, notices: Notices) -> None:
 class KafkaSource:
     """Messages of a topic, as a member of a group (see `record.Source`); order holds within a partition.
 
-    Members of one group share the topic's partitions; one for which none is left is told so.
+    Members of one group share the topic's partitions; one for which none is left gets a notice.
 
     Args:
         address: option `group` (default `jeat-graph.TOPIC`).
@@ -157,7 +157,7 @@ class KafkaSource:
         try:
             self._consumer.commit(offsets=places, asynchronous=False)
         except KafkaException:
-            return  # the group is being shared out anew: the next commit counts
+            return  # the group's partitions are being shared out again: the next commit counts
         self._next = {}
 
     def close(self) -> None:

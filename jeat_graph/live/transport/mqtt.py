@@ -38,7 +38,7 @@ class MqttSource:
 
     The broker keeps the session of `client` (option; default from the topic) for a day, and with it what
     was published meanwhile, as much as its own `max_queued_messages` allows. It keeps what that client once
-    subscribed to as well: messages of other topics are acknowledged, passed over and told of.
+    subscribed to as well: messages of other topics are acknowledged, passed over and reported.
 
     Args:
         address: options `client`, `most` (messages open at a time).

@@ -8,7 +8,7 @@ import re
 _PREFIX = "jeat-graph"
 #: So much of a name is there to be read (characters); the rest tells names apart.
 _READABLE = 32
-#: Digits of the hash: two of a million names are alike once in 10^7 times.
+#: Digits of the hash: two of a million names are the same once in 10^7 times.
 _DIGITS = 16
 
 

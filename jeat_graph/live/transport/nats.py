@@ -150,7 +150,7 @@ class NatsSource:
         return bytes(message.data)
 
     def _lost(self, timeout_s: float) -> None:
-        """Make the consumer anew, which somebody deleted; not at once, since the server may just start."""
+        """Make the consumer again, which somebody deleted; not at once, since the server may just start."""
         link = self._link
         end = time.monotonic() + timeout_s
         while time.monotonic() < end and not link.overdue():

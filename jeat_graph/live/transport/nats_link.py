@@ -32,7 +32,7 @@ class _NotOurs(logging.Filter):
     """Passes over what asyncio says of the client each time when an encrypted connection ends."""
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Tell whether a record is to be told."""
+        """Tell whether a record is to be reported."""
         return "eof_received" not in record.getMessage()
 
 

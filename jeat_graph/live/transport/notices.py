@@ -1,4 +1,4 @@
-"""What a broker's client notices in a thread of its own and the user is to be told."""
+"""What a broker's client notices in a thread of its own and the user is to know."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 #: Takes one line for the user.
 Tell = Callable[[str], object]
-#: So many things of a kind are told one by one; the rest is counted.
+#: So many things of a kind are reported one by one; the rest is counted.
 MOST_WARNED = 5
 
 
@@ -17,7 +17,7 @@ def say_nothing(_: str) -> None:
 
 
 class Notices:
-    """Lines for the user from any thread, told in the thread that asks for them.
+    """Lines for the user from any thread, reported in the thread that asks for them.
 
     Args:
         tell: takes each line.
@@ -42,13 +42,13 @@ class Notices:
         self._lines.append(line)
 
     def once(self, line: str) -> None:
-        """Keep a line that is told once, until `forget`."""
+        """Keep a line that is reported once, until `forget`."""
         if line not in self._known:
             self._known.add(line)
             self.add(line)
 
     def forget(self) -> None:
-        """Let what was told once be told again: it was over meanwhile."""
+        """Let what was reported once be reported again: it was over meanwhile."""
         self._known.clear()
 
     def found(self, where: object) -> None:

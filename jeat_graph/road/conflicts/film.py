@@ -30,7 +30,7 @@ _FARTHEST_PX = 1e4
 #: Corners of a rectangle in halves of its length and width, front first.
 _CORNERS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
 _TEXT_SCALE, _STROKE, _MARGIN_PX = 0.7, 2, 6
-#: A longer time to collision is not told (s).
+#: A longer time to collision is not shown (s).
 _LONGEST_TTC_S = 9.9
 
 Image = npt.NDArray[np.uint8]

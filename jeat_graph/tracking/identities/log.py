@@ -71,7 +71,7 @@ class IdentityLog:
             DataError: none gave it.
         """
         log, taken = cls(), Pass(state["assigned"], state["real"])
-        # Made anew, so that scans are checked as those of a user.
+        # Made again, so that scans are checked as those of a user.
         detections = Detections.from_scans(Scan(**vars(scan)) for scan in state["detections"].scans())
         camera, shape = state["camera"], (len(detections),)
         if camera.shape != (len(np.unique(detections.scan_t)), 2) or not np.isfinite(camera).all():

@@ -1,6 +1,6 @@
 """What pieces of tracks look like where they end and where they begin, and what that says of links.
 
-The embeddings of one sensor are compared with each other. How much more alike one object looks than two is
+The embeddings of one sensor are compared with each other. How much more similar one object looks than two is
 learnt for each sensor from the links, by the probabilities that these have without looks.
 """
 

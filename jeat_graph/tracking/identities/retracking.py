@@ -96,11 +96,11 @@ class _Table:
         if causal is not None:
             hit = _last_hits(causal, self._t[:done], self._decision.causal[:done])
             owner, changed = self._decision.owner[hit], self._changed[hit]
-            told = replace(self._told(causal, hit), track_id=self._name[hit])
-            parts.append(told.take(~changed))
-            self._beside.append(told.take(changed & (owner > 0)))
+            rows = replace(self._reported(causal, hit), track_id=self._name[hit])
+            parts.append(rows.take(~changed))
+            self._beside.append(rows.take(changed & (owner > 0)))
         if followed is not None and forced is not None:
-            parts.append(self._told(followed, _last_hits(followed, self._t[:done], forced.of_hit[:done])))
+            parts.append(self._reported(followed, _last_hits(followed, self._t[:done], forced.of_hit[:done])))
             self._followed.append((followed.track_id, followed.t))
         return _together(parts)
 
@@ -112,7 +112,7 @@ class _Table:
         ids, t = (np.concatenate(column) for column in zip(*self._followed, strict=True))
         return [lacking(beside, ids, t)]
 
-    def _told(self, table: Trajectories, hit: IntArray) -> Trajectories:
+    def _reported(self, table: Trajectories, hit: IntArray) -> Trajectories:
         """Return rows with the causal identity of the last detection of their track, and its probability."""
         d = self._decision
         return replace(table, causal_id=d.causal[hit], identity_probability=d.probability[hit])

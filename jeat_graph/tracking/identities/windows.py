@@ -400,11 +400,11 @@ class LagDecider:
         odds[order[starts]] = best
         keep = order[(rank < _KEPT) & alive[np.cumsum(begins) - 1]]
         ended = order[starts[~alive]]
-        gone = set(rows.owner[ended].tolist())
+        over = set(rows.owner[ended].tolist())
         counts = np.array([self._count.get(one, 0) for one in rows.owner[ended].tolist()], dtype=np.int64)
         rim = self._at_rim(tracker, rows.boxes[ended[counts >= deciding.LEAST_DETECTIONS]])
         self._past = self._past._replace(leaving=self._past.leaving + np.bincount(rim, minlength=2))
-        self._count = {one: count for one, count in self._count.items() if one and one not in gone}
+        self._count = {one: count for one, count in self._count.items() if one and one not in over}
         self._kept = rows._replace(odds=odds).take(np.sort(keep))
         causal, _ = self.in_view()
         most = max(causal, default=0)

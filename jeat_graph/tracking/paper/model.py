@@ -118,7 +118,7 @@ class PaperModel(SmoothsRecords):
         self._last = StepRecord(t, dt >= LONGEST_SILENCE_S, every.track_id, done.records, *flags, *gaps)
 
     def reset(self, t: float) -> None:
-        """End all tracks and go on from another time (s); what was learnt of them is gone."""
+        """End all tracks and go on from another time (s); what was learnt of them is lost."""
         now = self._now
         if now.t is None:
             return
@@ -175,7 +175,7 @@ class PaperModel(SmoothsRecords):
         return lambda: rows
 
     def predicted(self, t: float) -> tuple[ModelRows, FloatArray]:
-        """Return the confirmed tracks at a later time (s), and the covariances of what is told."""
+        """Return the confirmed tracks at a later time (s), and the covariances of what is reported."""
         dt = 0.0 if self._now.t is None else t - self._now.t
         return _rows(predict(self._reported(), dt, self._settings), t)
 
@@ -252,7 +252,7 @@ _OUTPUT = RowOutput(_reported_mean, lambda _, covariance: covariance)
 
 
 def _rows(tracks: PaperTracks, t: float | None) -> tuple[ModelRows, FloatArray]:
-    """Return confirmed tracks as rows of existence 1, and the covariances (N, 2, 5, 5) of what is told."""
+    """Return confirmed tracks as rows of existence 1, and covariances (N, 2, 5, 5) of what is reported."""
     n = len(tracks)
     states = together(tracks)
     when = np.full(n, 0.0 if t is None else t)

@@ -96,7 +96,7 @@ def record(
 
 
 def _for_rig(scenario: Scenario, duration_s: float) -> Scenario:
-    """Make the ring so long that nobody comes round: at another lap the same vehicles would look alike.
+    """Make the ring so long that nobody comes round: at another lap the same vehicles would be seen again.
 
     Raises:
         ConfigError: there is no second camera among the sensors, or it is the one that the truth is of.

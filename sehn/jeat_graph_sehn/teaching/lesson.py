@@ -133,8 +133,8 @@ def make_lesson(request: LessonRequest, say: Callable[[str], object] = lambda _:
 def _config(request: LessonRequest) -> Config:
     # As `track` does it: what a table says of its detectors goes with the preset that assumes nothing.
     declared = declared_by_all([(None, _place(path)) for path in request.data])
-    told = as_settings(declared) if request.config == _DEFAULT else []
-    overrides = [*told, *_SETTINGS, *request.overrides]
+    known = as_settings(declared) if request.config == _DEFAULT else []
+    overrides = [*known, *_SETTINGS, *request.overrides]
     if request.rig is None and not any(one.startswith("image") for one in request.overrides):
         wide, high = request.size_px
         overrides += [f"image.width={wide}", f"image.height={high}", "input.picture=given"]

@@ -119,7 +119,7 @@ class Batches:
         return ShownBatch([torch.from_numpy(np.stack([p[0] for p in parts]))], [[p[1] for p in parts]])
 
     def _sequences(self, step: int) -> ShownBatch:
-        """Make a batch of windows of events: parts of streams, then sequences that begin anew."""
+        """Make a batch of windows of events: parts of streams, then sequences that start over."""
         settings, net = self._settings, self._net
         size = settings.batch
         begun = [stream_begin(step, k, settings) for k in range(size)]

@@ -37,7 +37,7 @@ def read_checkpoint(path: Path, identity: str, device: str) -> dict[str, Any]:
         state = torch.load(path, map_location=device, weights_only=True)
         there = state.pop(_IDENTITY)
     except (OSError, RuntimeError, EOFError, KeyError, ValueError, AttributeError, pickle.UnpicklingError):
-        raise DataError("is damaged; remove it to begin anew", path) from None
+        raise DataError("is damaged; remove it to start over", path) from None
     if there != identity:
         raise OtherRunError(
             f"{path}: is of a training with other data or settings; remove it, or give another --out"

@@ -100,7 +100,7 @@ def _shape(half: FloatArray, rng: np.random.Generator) -> _Shape:
     cover = np.zeros((height, width), dtype=np.uint8)
     colours = _colours(width, height, rng)
     outline(cover, colours, rng)
-    # A picture is not sharp; what is drawn into it would be told by its edges.
+    # A picture is not sharp; what is drawn into it would be recognised by its edges.
     blur = float(rng.uniform(*_BLUR_PX))
     soft = cv2.GaussianBlur(cover, (0, 0), blur, borderType=cv2.BORDER_CONSTANT)
     smeared = cv2.GaussianBlur(colours, (0, 0), blur, borderType=cv2.BORDER_REPLICATE)

@@ -1,7 +1,7 @@
 """Truth that asks for far vehicles too, where they can be seen.
 
 A truth ends at some distance, and what is farther is neither asked for nor wrong. A detector finds it all the
-same, and one that was never told where such boxes lie says them badly; a tracker then follows them. In our
+same, and one that was never shown where such boxes lie says them badly; a tracker then follows them. In our
 simulated highways a third of all vehicles is so far away.
 """
 

@@ -1,6 +1,6 @@
 """The network that looks at pictures and events at once: two backbones, summed at each level through gates.
 
-Pictures may be older than the events, or missing; so may the events. The network is told how old the picture
+Pictures may be older than the events, or missing; so may the events. The network gets how old the picture
 is and what there is, and each cell weighs what the two sensors say. What it has seen of both it remembers, at
 each level: of a vehicle that one dark picture hardly shows, several show more. It is the family's early
 fusion.
@@ -31,7 +31,7 @@ from jeat_graph_sehn.training.settings import COLOURS, STRIDES, NetSettings
 GIVEN_INPUT = "given"
 #: Whether there is a picture (1 or 0), its age (s), whether there are events (1 or 0).
 TOLD = 3
-#: The age is told in units of this (s), and above the most of them it is no longer told apart.
+#: The age is given in units of this (s), and above the most of them all ages are the same.
 _AGE_S, _MOST_AGES = 0.1, 5.0
 
 
@@ -57,7 +57,7 @@ def silence(layer: nn.Conv2d) -> None:
 
 
 class GatedSum(nn.Module):
-    """Sums the features of both sensors: each cell and channel weighs them anew.
+    """Sums the features of both sensors: each cell and channel weighs them by itself.
 
     f = 2σ(a) p + 2σ(b) C e, where (a, b) = G [p, C e] + T given, p and e are of the picture and the events,
     and C brings what events say to the channels of the picture.
@@ -71,7 +71,7 @@ class GatedSum(nn.Module):
         self.carry = nn.Conv2d(channels, channels, 1)
         self.gate = nn.Conv2d(2 * channels, 2 * channels, 1)
         self.told = nn.Linear(TOLD, 2 * channels, bias=False)
-        # At first everything counts alike.
+        # At first everything counts equally.
         silence(self.gate)
         nn.init.zeros_(self.told.weight)
 

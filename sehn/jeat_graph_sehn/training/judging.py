@@ -244,7 +244,7 @@ def _seen(
 
 
 class _Reader:
-    """Looks at one thing after the other, and turns what is said into boxes just as its ONNX file is read."""
+    """Looks at one thing after the other, and turns the output into boxes just as its ONNX file is read."""
 
     def __init__(self, net: VehicleNet, side: tuple[int, int], second_look: bool) -> None:
         self._side = side

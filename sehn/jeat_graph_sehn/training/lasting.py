@@ -27,7 +27,8 @@ CELL_PX = STRIDES[0]
 FEATURES = 2 * len(SPANS_S)
 #: Channels of their state: the averages, and how much of each is filled since the beginning.
 TRACE_CHANNELS = 2 * FEATURES
-#: Events of a cell in a second that are not told from none: so cells without noise have a logarithm.
+#: Events of a cell in a second that cannot be distinguished from none: so cells without noise have a
+#: logarithm.
 _LEAST_HZ = 0.5
 #: Time constants of the states at first (s) are those of a memory that goes by windows, which in training are
 #: so far apart on average (s).
@@ -39,7 +40,7 @@ _FIRST_GAIN, _FIRST_OFFSET = 1.0, 4.0
 
 
 class SinceThen(NamedTuple):
-    """What a memory is told of windows.
+    """What a memory gets of windows.
 
     Attributes:
         elapsed_s: (L x B,) time since the window before each (s); at the first that of the window itself.

@@ -1,4 +1,4 @@
-"""What the network is told: which cell stands for which vehicle, and what its mistakes cost.
+"""What the network learns from: which cell stands for which vehicle, and what its mistakes cost.
 
 A cell may stand for a vehicle if its middle lies in the box, or nearer to the box's middle than one stride.
 Of those, the ones that already say it best (score^α IoU^β) are asked to say it, and the others not to. What

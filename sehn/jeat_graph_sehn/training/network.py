@@ -88,7 +88,7 @@ class Backbone(nn.Module):
         passed: SinceThen | None = None
         traced: tuple[Tensor, ...] = ()
         if self.traces is not None:
-            assert elapsed_s is not None, "a memory by time is told how much has passed"
+            assert elapsed_s is not None, "a memory by time gets how much has passed"
             activity, followed = self.traces.follow(x, state[2], length, elapsed_s)
             fine = fine + self.traces(activity)
             passed, traced = SinceThen(elapsed_s, activity), (followed,)

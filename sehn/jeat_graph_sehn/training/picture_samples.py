@@ -100,7 +100,7 @@ class LightChange(NamedTuple):
 
 
 def draw_light(rng: np.random.Generator, changes: PictureChanges) -> LightChange:
-    """Draw how a picture, or all of a sequence, are lit and grained anew."""
+    """Draw how a picture, or all of a sequence, are lit and grained."""
     gain = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(changes.exposure)))
     power = float(np.exp(rng.uniform(-1.0, 1.0) * np.log(changes.gamma)))
     # There are 256 grey levels: a table of them is a tenth of the work of doing it for each pixel.
@@ -116,7 +116,7 @@ def cut_out(
     light: LightChange,
     beside: TrueBoxes | None = None,
 ) -> npt.NDArray[np.float32]:
-    """Return the cut-out (3, H, W) of a picture (H, W, 3), lit and grained anew, red first, 0 to 1.
+    """Return the cut-out (3, H, W) of a picture (H, W, 3), lit and grained as drawn, red first, 0 to 1.
 
     Args:
         frame: the picture.

@@ -303,7 +303,9 @@ def _read(
     names = Counter(path.stem if path.suffix.lower() == _JSON else path.name for path in paths)
     name, times = names.most_common(1)[0]
     if times > 1:
-        raise DataError(f"{times} data sets are called {name}; their results could not be told apart", name)
+        raise DataError(
+            f"{times} data sets are called {name}; their results could not be distinguished", name
+        )
     return found
 
 

@@ -177,8 +177,8 @@ class TrainSettings(Section):
     )
     by_segment: bool = flag(
         False,
-        "whether each segment of pictures is shown alike often, not each picture: worlds of many pictures, "
-        "which are much alike, do not outweigh those of few",
+        "whether each segment of pictures is shown equally often, not each picture: worlds of many pictures, "
+        "which are very similar, do not outweigh those of few",
     )
     hold_first: bool = flag(
         False,
@@ -199,7 +199,7 @@ class TrainSettings(Section):
         0.0,
         "1",
         "share of a step's sequences that go on where those of the step before ended, with what is "
-        "remembered; the others begin anew",
+        "remembered; the others start over",
         0.0,
         1.0,
     )

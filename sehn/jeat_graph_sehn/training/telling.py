@@ -11,7 +11,7 @@ _S_PER_MIN, _S_PER_HOUR = 60.0, 3600.0
 
 
 class Telling:
-    """Passes on what is told now and then.
+    """Passes on what is reported now and then.
 
     Args:
         say: called with a line.

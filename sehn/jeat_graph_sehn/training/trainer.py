@@ -63,7 +63,7 @@ class TrainingJob:
         side: width and height that judged pictures are brought to (px).
         device: such as `cpu`.
         checkpoint: where the state is kept.
-        identity: what a checkpoint must be of, to be gone on with.
+        identity: what a checkpoint must be of, to be continued.
         start: networks that the first weights are taken from. Their normalisations are settled, and stay so.
     """
 
@@ -270,7 +270,7 @@ class Trainer:
             self._sums = [float(value) for value in state["sums"]]
             self.log = [LogRow(int(row[0]), *(float(v) for v in row[1:])) for row in state["log"]]
         except (KeyError, TypeError, ValueError, RuntimeError):
-            raise DataError("is damaged; remove it to begin anew", self._job.checkpoint) from None
+            raise DataError("is damaged; remove it to start over", self._job.checkpoint) from None
 
 
 def _groups(net: VehicleNet, decay: float) -> Sequence[dict[str, Any]]:

@@ -120,7 +120,7 @@ class TruthByTime:
         return 0.0
 
     def moved(self, start: float, end: float, least_px: float) -> set[int]:
-        """Return who has gone at least `least_px` from `start` to `end` (s), to and fro counted alike.
+        """Return who has gone at least `least_px` from `start` to `end` (s), to and fro counting the same.
 
         The way of that side of the box counts that goes farthest: what comes straight at the camera grows.
         """

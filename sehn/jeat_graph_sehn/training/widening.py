@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from jeat_graph_sehn.training.lasting import Lasting
 from jeat_graph_sehn.training.network import VehicleNet
 
-#: Shares of k copies are drawn from (1 ± this) / k: copies that count alike would learn alike for long.
+#: Shares of k copies are drawn from (1 ± this) / k: copies that count equally would learn the same for long.
 _SPREAD = 0.5
 
 

@@ -187,7 +187,7 @@ def test_every_command_reads_them_alike(tmp_path, capsys, name):
     LAYOUTS[name](path)
     assert main(["events", "info", str(path)]) == 0
     out = capsys.readouterr().out
-    assert f"picture: {WIDTH} x {HEIGHT} px (not said; so far the events reach)\nevents: {COUNT}," in out
+    assert f"picture: {WIDTH} x {HEIGHT} px (not declared; so far the events reach)\nevents: {COUNT}," in out
     assert main(["events", "convert", str(path), str(tmp_path / "o.raw")]) == 0
     assert "640 x 360 px, as far as its events reach, were taken" in capsys.readouterr().err
     np.testing.assert_array_equal(read(tmp_path / "o.raw")[0].x, X)
@@ -286,7 +286,7 @@ def test_one_event_far_outside(tmp_path, capsys):
     h5(path, events__x=X, events__y=y, events__p=P, events__t=T)
     assert main(["events", "info", str(path)]) == 0
     out = capsys.readouterr().out
-    assert "picture: 640 x 360 px (not said" in out
+    assert "picture: 640 x 360 px (not declared" in out
     assert "note: 1 events lie outside the picture and were left out" in out
     assert main(["events", "convert", str(path), str(tmp_path / "o.raw")]) == 2
     assert "single events lie as far out as x = 639, y = 33014" in capsys.readouterr().err

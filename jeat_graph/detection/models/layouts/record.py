@@ -25,7 +25,7 @@ class DecodedBoxes(NamedTuple):
     """Boxes in the network's input.
 
     Attributes:
-        corners: (M, 4) left, top, right, bottom (px of the input; of the picture where the network is told
+        corners: (M, 4) left, top, right, bottom (px of the input; of the picture where the network gets
             the picture's size).
         scores: (M,) 0 to 1.
         classes: (M,) number of the class.

@@ -44,7 +44,8 @@ class Source(Protocol):
 class Sink(Protocol):
     """Takes messages; waits where the broker is slower than they come.
 
-    One that is larger than the broker takes is not sent, told of and counted: to send it again is no help.
+    One that is larger than the broker takes is not sent, but reported and counted: to send it again is no
+    help.
 
     Attributes:
         address: where it writes.

@@ -164,9 +164,9 @@ class _Road:
         self.speed[order] = np.where(moved < 0.5 * (old + new) * _STEP_S - 1e-9, moved / _STEP_S, new)
         self.position[order] = before + moved
         self._note(order, before, moved, t)
-        gone = self.position > self.places[-1] + _BEYOND_M
-        gone |= self.position > self.leaves_at
-        self.on &= ~gone
+        outside = self.position > self.places[-1] + _BEYOND_M
+        outside |= self.position > self.leaves_at
+        self.on &= ~outside
         return int(self.on.sum() + self.waiting.sum())
 
     def _let_in(self, t: float) -> None:

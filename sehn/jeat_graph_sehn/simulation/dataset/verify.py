@@ -44,8 +44,8 @@ def verify(folder: str | Path, on_file: Callable[[], object] = lambda: None) -> 
 
     Checked are, by `manifest.json`: files that are missing, changed (SHA-256) or not listed. In segments of
     pictures: as many frames as times and as the truth has, events in order, within the picture and with the
-    right index by millisecond, boxes within the picture and alike in all formats. In a folder of detections:
-    boxes of the truth within the picture, and counts.
+    right index by millisecond, boxes within the picture and the same in all formats. In a folder of
+    detections: boxes of the truth within the picture, and counts.
 
     Args:
         folder: what `simulate` wrote.
@@ -169,13 +169,13 @@ def _check_truth(
     array = np.load(folder / BOXES, allow_pickle=False)
     asked = ~truth.ignore
     boxes = np.stack([array[name] for name in "xywh"], axis=1).astype(np.float64)
-    alike = (
+    same = (
         boxes.shape == truth.boxes[asked].shape
         and np.array_equal(array["t"], np.rint(truth.t[asked] * _US_PER_S).astype(np.int64))
         and np.array_equal(array["track_id"].astype(np.int64), truth.object_id[asked])
         and bool(np.all(np.abs(boxes - truth.boxes[asked]) < _TOLERANCE_PX))
     )
-    if not alike:
+    if not same:
         yield f"{folder / BOXES}: not the boxes of {TRUTH} that are asked for"
     lines = (folder / VEHICLES).read_text(encoding="utf-8").count("\n") - 1
     if lines != len(truth):

@@ -140,7 +140,7 @@ def hide_lamps(
                     free *= 1.0 - min(1.0, inside / _HIDDEN_M)
             at[LAMP_SEEN] = free
             if free > 0.0:
-                # Where glow falls below what can be told from the picture it is left out.
+                # Where glow falls below what can be distinguished from the picture it is left out.
                 level = optics.scale * at[LAMP_FLUX] / (_FAINT * lights.floor)
                 reach = optics.core_px * math.sqrt(max(level, 1.0) ** _INVERSE_POWER - 1.0)
                 at[LAMP_REACH] = min(optics.reach_px, reach)

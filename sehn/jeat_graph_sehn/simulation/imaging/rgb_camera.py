@@ -28,7 +28,7 @@ from jeat_graph_sehn.simulation.imaging.renderer import Renderer
 from jeat_graph_sehn.simulation.imaging.stage import Stage
 from jeat_graph_sehn.simulation.imaging.tiles import TILE_H, TILE_W
 
-_STEP_PX = 2.0  # in a blurred picture images of lamps that lie farther apart can be told from each other
+_STEP_PX = 2.0  # in a blurred picture images of lamps that lie farther apart can be distinguished
 _POISSON_BELOW_E = 16.0
 _SMOOTHED_E = 2.5  # of read noise, beyond which nobody can tell that photoelectrons come one by one
 _SKEWED_BELOW_E = 60.0

@@ -104,7 +104,7 @@ def _on_ground(
         v, x, y = kept[n], value[n, 0], value[n, 1]
         apart = value[n, 3] / across if across > 0.0 else 0.0
         near = not whole or apart <= _FAR_TILES * _FAR_TILES
-        # Whether beams matter on this tile is told by its corners, unless these are near the lamps.
+        # Whether beams matter on this tile is decided by its corners, unless these are near the lamps.
         if not near and value[n, 4] < enough:
             continue
         lamp, shine = (x, y, pose[v, 2], pose[v, 3]), (float(fade[v]), limit2, peak, stray)

@@ -9,7 +9,7 @@ import numpy as np
 from jeat_graph.data.arrays import FloatArray, IntArray
 from jeat_graph_sehn.simulation.world.camera import Camera
 
-# Small tiles: only what changes is painted anew, and a rolling shutter exposes rows at times of their own.
+# Small tiles: only what changes is painted again, and a rolling shutter exposes rows at times of their own.
 TILE_H, TILE_W = 8, 8
 TILE = TILE_H * TILE_W
 

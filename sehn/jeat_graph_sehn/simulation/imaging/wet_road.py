@@ -27,7 +27,7 @@ WIDER = 1.5  # a streak's width over the lamp's image
 _DARKER = 0.4  # share of the albedo that a film of water takes
 _WATER = 0.02  # reflectance of water at normal incidence
 _SLOPE = 0.05  # of the facets, rms
-_FACETS_M = 25.0  # distance from which single facets are no longer told apart
+_FACETS_M = 25.0  # distance from which single facets are no longer distinguished
 _DOWNWARDS = 0.1  # share of a street lamp's intensity that it sends at low angles to a wet road
 
 
