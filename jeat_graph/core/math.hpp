@@ -134,8 +134,9 @@ inline double log_gamma(double x) {
     return (x - 0.5) * log_of(x) - x + 0.91893853320467274 + series - log_of(product);
 }
 
-// ln B(a, b).
-inline double log_beta(double a, double b) { return log_gamma(a) + log_gamma(b) - log_gamma(a + b); }
+// ln B(a, b) = ln Γ(a) + ln Γ(b) - ln Γ(a + b), and four logarithms: computed side by side.
+double log_beta(double a, double b);
+std::array<double, 4> logs_of(double a, double b, double c, double d);
 
 inline double square(double x) { return x * x; }
 inline double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }

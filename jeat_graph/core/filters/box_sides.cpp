@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "wide.hpp"
+#include "wide_math.hpp"
 
 namespace jeat::filters {
 
@@ -14,17 +14,32 @@ double student_weight(double d2, const ModelConstants& c) {
     return clamp((nu + 4.0) / (nu + std::min(d2, kMostDistance)), kLeastWeight, 1.0);
 }
 
-// Probabilities that the left or the right side of one axis is cut.
-std::array<double, 2> cut_probabilities(double left, double right, const SidesExpected& expected, int axis,
-                                               const ShareLogs& logs) {
-    const Pair2& S = expected.S[axis];
-    const double both = -0.5 * S.squared_distance(left, right) - 0.5 * expected.log_det[axis] - kLog2Pi;
+// Probabilities that each side is cut: left, right, top, bottom.
+JEAT_GRAPH_PART void cut_probabilities(const std::array<double, 4>& y, const SidesExpected& expected,
+                                       const ShareLogs& logs, Four& out) {
+    // Of both axes side by side: the first two numbers of four, and the other two once more.
+    Four total, cut_low, cut_high;
     const auto alone = [](double y, double v, double log_v) { return -0.5 * y * y / v - 0.5 * (log_v + kLog2Pi); };
-    const double inside = logs.cut - expected.log_size[axis];
-    const double cut_left = alone(right, S.rr, expected.log_right[axis]) + inside + (left > 0.0 ? 0.0 : kOutwards);
-    const double cut_right = alone(left, S.ll, expected.log_left[axis]) + inside + (right < 0.0 ? 0.0 : kOutwards);
-    const double total = log_add(log_add(both, cut_right), cut_left);
-    return {exp_of(cut_left - total), exp_of(cut_right - total)};
+    for (int axis = 0; axis < 2; ++axis) {
+        const Pair2& S = expected.S[axis];
+        const double left = y[2 * axis], right = y[2 * axis + 1], inside = logs.cut - expected.log_size[axis];
+        const double both = -0.5 * S.squared_distance(left, right) - 0.5 * expected.log_det[axis] - kLog2Pi;
+        const double low = alone(right, S.rr, expected.log_right[axis]) + inside + (left > 0.0 ? 0.0 : kOutwards);
+        const double high = alone(left, S.ll, expected.log_left[axis]) + inside + (right < 0.0 ? 0.0 : kOutwards);
+        total[axis] = total[2 + axis] = both;
+        cut_low[axis] = cut_low[2 + axis] = low;
+        cut_high[axis] = cut_high[2 + axis] = high;
+    }
+    take_log_add(total, cut_high);
+    take_log_add(total, cut_low);
+    out = Four{cut_low[0] - total[0], cut_high[0] - total[0], cut_low[1] - total[1], cut_high[1] - total[1]};
+    take_exp(out);
+}
+
+// Width and height of the box that a detector is expected to give.
+JEAT_GRAPH_PART void expected_size(const double* mean, Four& out) {
+    out = Four{expected_log_size(mean, 0), expected_log_size(mean, 1), 0.0, 0.0};
+    take_exp(out);
 }
 
 // Update one axis by its two sides, whose variances are R, in Joseph's form.
@@ -89,6 +104,30 @@ bool uncover(double* mean, double* P, double& left, double& right, const SidesEx
 
 }  // namespace
 
+JEAT_GRAPH_WIDE SidesExpected expected_sides(const double* mean, const double* covariance, double rho2,
+                                    const ModelConstants& c) {
+    SidesExpected out;
+    Four size;
+    expected_size(mean, size);
+    out.box = expected_corners(mean, size[0], size[1]);
+    out.size = {out.box.width(), out.box.height()};
+    const double both = std::sqrt(out.size[0] * out.size[1]);
+    for (int axis = 0; axis < 2; ++axis) {
+        const double* const P = covariance + axis * kMatrix;
+        const auto sum = [P](int i, int j, int k, int l) { return P[i * kStates + k] + P[i * kStates + l] + P[j * kStates + k] + P[j * kStates + l]; };
+        const double w = out.size[axis], a = sum(kPosition, kPositionError, kPosition, kPositionError);
+        const double b = w * sum(kPosition, kPositionError, kLogSize, kSizeError);
+        const double d = w * w / 4.0 * sum(kLogSize, kSizeError, kLogSize, kSizeError);
+        const double R = side_variance(w, both, rho2, c);
+        out.variance[2 * axis] = out.variance[2 * axis + 1] = R;
+        out.S[axis] = {a - b + d + R, a - d, a + b + d + R};
+        Four of{out.S[axis].determinant(), out.S[axis].ll, out.S[axis].rr, w};
+        take_log(of);
+        out.log_det[axis] = of[0], out.log_left[axis] = of[1], out.log_right[axis] = of[2], out.log_size[axis] = of[3];
+    }
+    return out;
+}
+
 bool uncover_sides(double* mean, double* covariance, std::array<double, 4>& y, const SidesExpected& expected,
                           const Edges& unmeasured, const ShareLogs& logs, const ModelConstants& c) {
     bool shows = false;
@@ -103,16 +142,17 @@ JEAT_GRAPH_WIDE void update(double* mean, double* covariance, const std::array<d
                             const std::array<double, 4>& left_over, const SidesExpected& expected, const Edges& unmeasured,
                             const ShareLogs& logs, const ModelConstants& c) {
     const double heavy = 1.0 / student_weight(squared_distance(y, expected.S), c);
+    Four cut, size;
+    cut_probabilities(y, expected, logs, cut);
+    expected_size(mean, size);
     for (int axis = 0; axis < 2; ++axis) {
-        const double left = y[2 * axis], right = y[2 * axis + 1];
         double *const m = mean + axis * kStates, *const P = covariance + axis * kMatrix;
-        const auto cut = cut_probabilities(left, right, expected, axis, logs);
-        const double tail = cut[0] + cut[1] > 0.5 ? 1.0 : heavy;
+        const double tail = cut[2 * axis] + cut[2 * axis + 1] > 0.5 ? 1.0 : heavy;
         const double Rl = expected.variance[2 * axis] * tail, Rr = expected.variance[2 * axis + 1] * tail;
         const double none = square(kUnmeasured * expected.size[axis]);
-        update_axis(m, P, left_over[2 * axis], left_over[2 * axis + 1], exp_of(m[kLogSize] + m[kSizeError]),
-                    unmeasured.at[2 * axis] ? none : Rl / std::max(1.0 - cut[0], kLeastProbability),
-                    unmeasured.at[2 * axis + 1] ? none : Rr / std::max(1.0 - cut[1], kLeastProbability));
+        update_axis(m, P, left_over[2 * axis], left_over[2 * axis + 1], size[axis],
+                    unmeasured.at[2 * axis] ? none : Rl / std::max(1.0 - cut[2 * axis], kLeastProbability),
+                    unmeasured.at[2 * axis + 1] ? none : Rr / std::max(1.0 - cut[2 * axis + 1], kLeastProbability));
     }
 }
 

@@ -55,26 +55,7 @@ inline double side_variance(double size, double both, double rho2, const ModelCo
     return rho2 * square(side_scale(size, both)) + square(c.pixel_std);
 }
 
-inline SidesExpected expected_sides(const double* mean, const double* covariance, double rho2,
-                                    const ModelConstants& c) {
-    SidesExpected out;
-    out.box = expected_corners(mean);
-    out.size = {out.box.width(), out.box.height()};
-    const double both = std::sqrt(out.size[0] * out.size[1]);
-    for (int axis = 0; axis < 2; ++axis) {
-        const double* const P = covariance + axis * kMatrix;
-        const auto sum = [P](int i, int j, int k, int l) { return P[i * kStates + k] + P[i * kStates + l] + P[j * kStates + k] + P[j * kStates + l]; };
-        const double w = out.size[axis], a = sum(kPosition, kPositionError, kPosition, kPositionError);
-        const double b = w * sum(kPosition, kPositionError, kLogSize, kSizeError);
-        const double d = w * w / 4.0 * sum(kLogSize, kSizeError, kLogSize, kSizeError);
-        const double R = side_variance(w, both, rho2, c);
-        out.variance[2 * axis] = out.variance[2 * axis + 1] = R;
-        out.S[axis] = {a - b + d + R, a - d, a + b + d + R};
-        out.take_logs(axis);
-        out.log_size[axis] = log_of(w);
-    }
-    return out;
-}
+SidesExpected expected_sides(const double* mean, const double* covariance, double rho2, const ModelConstants& c);
 
 // Innovations of the sides by axis: left, right, top, bottom.
 inline std::array<double, 4> side_innovations(const Sides& box, const Sides& expected) {

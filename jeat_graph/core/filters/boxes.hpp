@@ -43,11 +43,16 @@ inline Sides corners(const double* mean) {
 }
 
 // The box that a detector is expected to give: with the error that lasts.
-inline Sides expected_corners(const double* mean) {
-    const double w = exp_of(mean[kLogSize] + mean[kSizeError]);
-    const double h = exp_of(mean[kStates + kLogSize] + mean[kStates + kSizeError]);
+inline Sides expected_corners(const double* mean, double w, double h) {
     const double x = mean[kPosition] + mean[kPositionError], y = mean[kStates + kPosition] + mean[kStates + kPositionError];
     return {x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0};
+}
+
+inline double expected_log_size(const double* mean, int axis) {
+    return mean[axis * kStates + kLogSize] + mean[axis * kStates + kSizeError];
+}
+inline Sides expected_corners(const double* mean) {
+    return expected_corners(mean, exp_of(expected_log_size(mean, 0)), exp_of(expected_log_size(mean, 1)));
 }
 
 // Boxes by their left sides: which of them may reach into an interval, without a look at the rest. Where there are

@@ -20,7 +20,9 @@ struct RepeatCounts {
     std::vector<std::uint8_t> last_had_before;
     bool has_last = false;
 
-    void count(const std::vector<Sides>& now, const std::vector<double>& logits, const ModelConstants& c) {
+    // `assignment` is room to work in.
+    void count(const std::vector<Sides>& now, const std::vector<double>& logits, association::Assignment& assignment,
+               const ModelConstants& c) {
         std::vector<std::uint8_t> had_before(now.size(), 0), has_after(last_boxes.size(), 0);
         if (has_last && !now.empty() && !last_boxes.empty()) {
             const ByLeft index(now);
@@ -30,7 +32,6 @@ struct RepeatCounts {
                     const double overlap = intersection_over_union(last_boxes[i], box);
                     if (overlap >= c.repeat_overlap) pairs.push_back({i, j, overlap});
                 });
-            association::Assignment assignment;
             for (const std::size_t k : assignment.solve(pairs, last_boxes.size(), now.size(), c.exact_assignment))
                 has_after[pairs[k].row] = had_before[pairs[k].column] = 1;
         }

@@ -75,11 +75,21 @@ inline std::array<double, 4> difference(const Sides& a, const Sides& b, double m
             log_of(a.width() / b.width()), log_of(a.height() / b.height())};
 }
 
-inline Sides corrected(const Sides& box, const std::array<double, 4>& offset) {
-    const double x = (box.left + box.right) / 2.0 - offset[0] * box.width();
-    const double y = (box.top + box.bottom) / 2.0 - offset[1] * box.height();
-    const double w = box.width() * exp_of(-offset[2]) / 2.0, h = box.height() * exp_of(-offset[3]) / 2.0;
-    return {x - w, y - h, x + w, y + h};
-}
+// What makes a sensor's boxes what they are on the average.
+class Correction {
+public:
+    explicit Correction(const std::array<double, 4>& offset)
+        : x_(offset[0]), y_(offset[1]), width_(exp_of(-offset[2])), height_(exp_of(-offset[3])) {}
+
+    Sides corrected(const Sides& box) const {
+        const double x = (box.left + box.right) / 2.0 - x_ * box.width();
+        const double y = (box.top + box.bottom) / 2.0 - y_ * box.height();
+        const double w = box.width() * width_ / 2.0, h = box.height() * height_ / 2.0;
+        return {x - w, y - h, x + w, y + h};
+    }
+
+private:
+    double x_, y_, width_, height_;
+};
 
 }  // namespace jeat::filters

@@ -131,18 +131,27 @@ inline double object_size(const double* mean) { return exp_of(0.5 * (mean[kLogSi
 
 inline double mean_growth(const double* mean) { return 0.5 * (mean[kGrowth] + mean[kStates + kGrowth]); }
 
-// The transition of a track that moves at constant speed in space: a = 2 g v, dg/dt = g^2 (g the rate of ln size).
-inline Matrix in_perspective(const Matrix& F, double g, double dt, const ModelConstants& c) {
+// By how much ln size grows in a step (g the rate of ln size), as far as perspective takes it.
+inline double step_growth(double g, double dt, const ModelConstants& c) {
+    return clamp(g * dt, -c.most_perspective, c.most_perspective);
+}
+
+// The transition of a track that moves at constant speed in space: a = 2 g v, dg/dt = g^2. It grows by x, and `faster` is
+// e^2x.
+inline Matrix in_perspective(const Matrix& F, double x, double faster) {
     Matrix out = F;
-    const double x = clamp(g * dt, -c.most_perspective, c.most_perspective);
     if (std::abs(x) < kLeastPerspective) return out;
-    const double faster = exp_of(2.0 * x), further = (faster - 1.0) / (2.0 * x);
+    const double further = (faster - 1.0) / (2.0 * x);
     const double growing = 1.0 / (1.0 - x), grown = -log_of(1.0 - x) / x;
     out[kPosition * kStates + kVelocity] *= further;
     out[kVelocity * kStates + kVelocity] *= faster;
     out[kLogSize * kStates + kGrowth] *= grown;
     out[kGrowth * kStates + kGrowth] *= growing;
     return out;
+}
+inline Matrix in_perspective(const Matrix& F, double g, double dt, const ModelConstants& c) {
+    const double x = step_growth(g, dt, c);
+    return std::abs(x) < kLeastPerspective ? F : in_perspective(F, x, exp_of(2.0 * x));
 }
 
 // The densities themselves, but of the jerk the root.
@@ -162,72 +171,9 @@ inline constexpr int kDriven[kStates][2] = {{kPosition, kAcceleration}, {kVeloci
 // Rows of matrices are this long where loops over them are to become vectors.
 inline constexpr int kRow = kStates + 1;
 
-// A number of each axis: what is computed of both is computed side by side.
-struct Both {
-    double x, y;
-};
-inline Both operator+(Both a, Both b) { return {a.x + b.x, a.y + b.y}; }
-inline Both operator*(double f, Both a) { return {f * a.x, f * a.y}; }
-
-// Call body(i) for i from `First` to `Last`, which are known when it is compiled: no loop is left.
-template <int First, int Last, class Body> inline void each(Body body) {
-    [&]<int... I>(std::integer_sequence<int, I...>) {
-        (body(std::integral_constant<int, First + I>{}), ...);
-    }(std::make_integer_sequence<int, Last - First + 1>{});
-}
-
-// P <- F P F' + Q of both axes, of whose upper triangles alone.
-inline void predict_covariances(double* P, const Matrix& F, const Matrix& Q) {
-    constexpr int kLast = kStates - 1;
-    Both FP[kStates][kStates];
-    each<0, kLast>([&](auto i) {
-        each<i, kLast>([&](auto j) {
-            Both sum{0.0, 0.0};
-            each<kDriven[i][0], kDriven[i][1]>([&](auto k) {
-                sum = sum + F[i * kStates + k] * Both{P[k * kStates + j], P[kMatrix + k * kStates + j]};
-            });
-            FP[i][j] = sum;
-        });
-    });
-    each<0, kLast>([&](auto i) {
-        each<i, kLast>([&](auto j) {
-            Both sum{0.0, 0.0};
-            each<kDriven[j][0], kDriven[j][1]>([&](auto k) { sum = sum + F[j * kStates + k] * FP[i][k]; });
-            const double q = Q[i * kStates + j];
-            const Both out = sum + Both{q, q};
-            P[i * kStates + j] = P[j * kStates + i] = out.x;
-            P[kMatrix + i * kStates + j] = P[kMatrix + j * kStates + i] = out.y;
-        });
-    });
-}
-
 // m <- F m, P <- F P F' + Q.
-inline void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
-                    const ModelConstants& c) {
-    const Matrix F = in_perspective(step.F, mean_growth(mean), dt, c);
-    const double size = object_size(mean);
-    std::array<double, kMean> predicted{};
-    for (int axis = 0; axis < 2; ++axis)
-        for (int i = 0; i < kStates; ++i)
-            for (int j = kDriven[i][0]; j <= kDriven[i][1]; ++j)
-                predicted[axis * kStates + i] += F[i * kStates + j] * mean[axis * kStates + j];
-    const double growth = 0.5 * (std::abs(predicted[kGrowth]) + std::abs(predicted[kStates + kGrowth]));
-    const double g = std::min(growth, c.fastest_growth);
-    const double jerk = q.root_jerk + c.perspective_jerk * g * g * std::sqrt(g);
-    const double by_jerk = square(jerk * size), by_walk = q.position * square(size);
-    Matrix Q;
-    for (int k = 0; k < kMatrix; ++k)
-        Q[k] = by_jerk * step.jerk[k] + q.growth * step.growth[k] + q.size * step.size[k] + by_walk * step.position[k];
-    predict_covariances(covariance, F, Q);
-    for (int axis = 0; axis < 2; ++axis) {
-        double* const P = covariance + axis * kMatrix;
-        const LastingError error(exp_of(mean[axis * kStates + kLogSize]), size, q.rho2, c);
-        const double forgotten = 1.0 - square(F[kPositionError * kStates + kPositionError]);
-        P[kPositionError * kStates + kPositionError] += forgotten * error.position;
-        P[kSizeError * kStates + kSizeError] += forgotten * error.size;
-    }
-    std::copy(predicted.begin(), predicted.end(), mean);
-}
+void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
+             const ModelConstants& c);
 
 // What tables tell of a track and its variances, `kMotion` for each axis: reported_motion and the diagonal of reported_covariance.
 inline void report_motion(const double* mean, const double* covariance, const ModelConstants& c, double* reported,

@@ -108,11 +108,14 @@ void Associator::find_candidates(const State& state, const CorrectedBoxes& scan,
         const SidesExpected& expected = out.expected[i];
         const double p = clamp(tracks.presence_of(i)[kVisible] * out.p_detect[i], association::kLeastPDetect,
                                association::kMostPDetect);
-        const double clutter = terms.log_clutter - log_of(expected.size[0] * expected.size[1]);
         const double real = std::max(tracks.real[i], association::kLeastPosterior);
-        const TrackTerms track{expected, spread, log_of(p / (1.0 - p)) - clutter, real};
+        const double best = (std::max(real, 1.0 - real) + c.score_floor) / least_of_clutter;
+        const auto [log_area, log_odds, log_best, unused] =
+            logs_of(expected.size[0] * expected.size[1], p / (1.0 - p), best, 1.0);
+        const double start = log_odds - (terms.log_clutter - log_area);
         if (tracks.given[i] >= 0) {
             // Its box is given, however far off: that is no reason to doubt that it is real.
+            const TrackTerms track{expected, spread, start, real, association::Gates(c)};
             const std::size_t j = box_of(tracks.given[i]);
             if (j < scan.size())
                 candidates_.push_back({i, j, std::max(log_ratio(track, scan, j, terms, c), association::kLeastGain)});
@@ -120,12 +123,12 @@ void Associator::find_candidates(const State& state, const CorrectedBoxes& scan,
         }
         // A box that the edge cuts may lie farther off, but is only compared so where the object reaches the edge. What a
         // box with a spread of its own can gain is not known beforehand.
-        const double best = (std::max(real, 1.0 - real) + c.score_floor) / least_of_clutter;
-        const association::Gates gates = reaches_edge(expected.box, state) || !scan.spreads.empty()
-                                             ? association::Gates(c)
-                                             : association::Gates(expected, track.start + log_of(best), terms, c);
-        const double reach = association::reach(expected, 0, most[0], gates, c);
-        const double above = association::reach(expected, 1, most[1], gates, c);
+        const TrackTerms track{expected, spread, start, real,
+                               reaches_edge(expected.box, state) || !scan.spreads.empty()
+                                   ? association::Gates(c)
+                                   : association::Gates(expected, start + log_best, terms, c)};
+        const double reach = association::reach(expected, 0, most[0], track.gates, c);
+        const double above = association::reach(expected, 1, most[1], track.gates, c);
         const auto weigh = [&](std::size_t j, const Sides& box) {
             if (std::abs(box.top - expected.box.top) > above || is_owned(given, j)) return;
             const double gain = log_ratio(track, scan, j, terms, c);
@@ -144,7 +147,7 @@ double Associator::log_ratio(const TrackTerms& track, const CorrectedBoxes& scan
     const SidesExpected* expected = &track.expected;
     if (!scan.spreads.empty()) own = scan.with_own_spread(*expected, box, track.spread), expected = &own;
     if (cut.any()) own = with_cut(*expected, cut, c), expected = &own;
-    const double density = association::sides_log_density(y, *expected, terms, c);
+    const double density = association::sides_log_density(y, *expected, track.gates, terms, c);
     if (density <= association::kImpossible) return density;
     const double of_track = association::score_likelihood(track.real, q_[box], c);
     return track.start + density + log_of(of_track / of_clutter_[box]);

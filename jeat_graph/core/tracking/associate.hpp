@@ -17,11 +17,13 @@ public:
     void associate(const State& state, const CorrectedBoxes& scan, Scan& given, AssociatedPairs& out);
 
 private:
-    // What all pairs of one track have in common: `start` is what neither score nor place say of ln L.
+    // What all pairs of one track have in common: `start` is what neither score nor place say of ln L; outside of the
+    // gates no pair has a ratio above 1.
     struct TrackTerms {
         const SidesExpected& expected;
         const SpreadNoise& spread;
         double start, real;
+        association::Gates gates;
     };
 
     double weigh_scores(const State& state, const Scan& given);

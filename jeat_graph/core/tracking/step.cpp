@@ -35,7 +35,7 @@ std::vector<std::size_t> order_of_scans(const State& state, const std::vector<Sc
 }
 
 // Take notice of a scan: the sensor's period, its decision threshold, the picture and its edges.
-ScanClock begin_scan(State& state, double t, const Scan& scan) {
+ScanClock begin_scan(State& state, double t, const Scan& scan, association::Assignment& repeats) {
     const ModelConstants& c = state.constants;
     Sensor& sensor = state.sensors[scan.sensor];
     for (const Sides& box : scan.boxes) {
@@ -56,7 +56,7 @@ ScanClock begin_scan(State& state, double t, const Scan& scan) {
                               : kPeriodMemory * sensor.period_s + (1.0 - kPeriodMemory) * since;
     }
     sensor.last_scan_s = t;
-    sensor.repetition.count(scan.boxes, scan.logits, c);
+    sensor.repetition.count(scan.boxes, scan.logits, repeats, c);
     state.belief.decision_threshold[scan.sensor] =
         std::isnan(sensor.even_logit) ? sensor.repetition.decision_threshold(c) : sensor.even_logit;
     const double period = std::isnan(sensor.period_s) ? c.first_period_s : sensor.period_s;
@@ -87,14 +87,14 @@ void predict(State& state, double t, TimeStep& step) {
 // edge more often than they reach beyond is taken to cut them there.
 void correct_boxes(const State& state, const Scan& scan, CorrectedBoxes& out) {
     const ModelConstants& c = state.constants;
-    const auto offset = state.offsets.offset(scan.sensor, state.noises(), c);
+    const Correction correction(state.offsets.offset(scan.sensor, state.noises(), c));
     const Sensor& sensor = state.sensors[scan.sensor];
     const bool cuts = state.picture_known && sensor.boxes_at_edge >= sensor.boxes_beyond;
     out.boxes.clear();
     out.edges.clear();
     out.spreads = scan.spreads;
     for (const Sides& box : scan.boxes) {
-        out.boxes.push_back(corrected(box, offset));
+        out.boxes.push_back(correction.corrected(box));
         out.edges.push_back(cuts ? edges_of(box, state.width, state.height, c) : Edges{});
     }
     out.index.emplace(out.boxes);
@@ -134,7 +134,7 @@ void Step::run(double t, std::vector<Scan>& scans, const PictureMotion* motion, 
 
 void Step::take(double t, Scan& scan, const PictureMotion* motion, double step_s, Record* record) {
     const std::size_t sensor = scan.sensor;
-    const ScanClock clock = begin_scan(state_, t, scan);
+    const ScanClock clock = begin_scan(state_, t, scan, repeats_);
     if (record) record_growth(state_, *record);
     predict(state_, t, time_step_);
     correct_boxes(state_, scan, corrected_);

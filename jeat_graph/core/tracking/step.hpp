@@ -43,6 +43,7 @@ private:
 
     State& state_;
     const ShareLogs logs_;
+    association::Assignment repeats_;
     TimeStep time_step_;
     CorrectedBoxes corrected_;
     CameraFollower follower_;
