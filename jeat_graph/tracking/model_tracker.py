@@ -292,14 +292,13 @@ class ModelTracker(Updates, SmoothedTables, SavedModel, OldNames, OneAtATime):
 
         Identities go on, and so does what was learnt of the scene: it is as if no time had passed.
         """
-        if self.time is not None:
-            if self._lag is not None:
-                self._lag.reset(self, t)
-            self._model.reset(t)
-            # The model has no last step now, so there are no boxes of one either.
-            self._order, self._given = _NO_BOXES, 0
-            self._boxes, self._causal = StepBoxes.none(), None
-            self._instants.reset()
+        if self._lag is not None and self.time is not None:
+            self._lag.reset(self, t)
+        self._model.reset(t)
+        # The model has no last step now, so there are no boxes of one either.
+        self._order, self._given = _NO_BOXES, 0
+        self._boxes, self._causal = StepBoxes.none(), None
+        self._instants.reset()
 
     def number_on_from(self, identity: int) -> None:
         """Give no track that begins from now on an identity below this."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import box_sides, gap_survival, object_probability, sensor_accuracy, sensor_offsets
+from jeat_graph.filters.camera_path import CameraPath
 from jeat_graph.filters.evidence import Evidence, ScanClock
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.picture_motion import CameraVelocity, with_velocity
@@ -173,14 +174,16 @@ def reset(state: ReferenceState, t: float, c: ModelConstants) -> None:
     ended = state.ended.append(state.tracks.evidence)
     state.ended = ended.take(slice(-c.remembered_tracks, None))
     state.tracks = state.tracks.take(slice(0, 0))
-    if state.t is None:
+    now = state.reset_s if state.t is None else state.t
+    if now is None:
         return
     # A sensor has not looked again since: not for less than the time between two of its scans.
     period = np.where(np.isnan(state.period_s), c.first_period_s, state.period_s)
-    state.last_scan_s = t - np.clip(state.t - state.last_scan_s, period, _LONGEST_AGO_S)
-    state.learnt_s = t - min(max(state.t - state.learnt_s, 0.0), _LONGEST_AGO_S)
+    state.last_scan_s = t - np.clip(now - state.last_scan_s, period, _LONGEST_AGO_S)
+    state.learnt_s = t - min(max(now - state.learnt_s, 0.0), _LONGEST_AGO_S)
     state.camera_velocity = CameraVelocity.none()
-    state.t = None
+    state.camera_path = CameraPath.none()
+    state.t, state.reset_s = None, t
 
 
 def unseen_for(state: ReferenceState) -> FloatArray:

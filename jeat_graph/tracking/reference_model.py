@@ -85,6 +85,9 @@ class ReferenceModel(OneModel):
         if is_reset:
             reset(self._state, t, self.constants)
             similarity = motion = None
+        if self._state.t is None and self._state.reset_s is not None and t < self._state.reset_s:
+            # Time goes on from before the moment that it was to go on from.
+            reset(self._state, t, self.constants)
         scans = [
             SensorScan(
                 int(k),

@@ -161,6 +161,7 @@ class ReferenceState:
     Attributes:
         tracks: the living tracks.
         t: time of the last step (s); None before the first. `predict`
+        reset_s: moment that time was last to go on from (s); None before it was to. `reset`
         next_id: identity of the next track. `begin_tracks`
         picture: width and height (px); 1 x 1 and growing with the boxes where it is not known. `begin_scan`
         picture_known: whether it is.
@@ -191,6 +192,7 @@ class ReferenceState:
 
     tracks: ReferenceTracks
     t: float | None
+    reset_s: float | None
     next_id: int
     picture: tuple[float, float]
     picture_known: bool
@@ -269,6 +271,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
     return ReferenceState(
         tracks=ReferenceTracks.none(),
         t=None,
+        reset_s=None,
         next_id=1,
         picture=(1.0, 1.0) if picture is None else picture,
         picture_known=picture is not None,

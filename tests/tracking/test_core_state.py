@@ -207,6 +207,28 @@ def test_time_begins_anew_as_if_none_had_passed():
     assert tracker.num_born == born + 1
 
 
+@pytest.mark.parametrize("engine", ["core", "reference"])
+@pytest.mark.parametrize("moments", [(-3600.0, -7199.9), (-3600.0,), (-9000.0, -3600.0)])
+def test_of_several_resets_the_last_counts_and_a_step_before_it(tmp_path, engine, moments):
+    def after(moments):
+        tracker = ModelTracker(load_config("default"), engine=engine, image=(1280, 720))
+        for scan in traffic(times=40):
+            tracker.step(scan)
+        for moment in moments:
+            tracker.reset(moment)
+        scans = [(-7199.9 + 0.1 * k, "cam", [[10 + k, 10, 40, 40]], [0.9]) for k in range(20)]
+        return tracker, [tracker.step(scan) for scan in scans]
+
+    tracker, tables = after(moments)
+    one, expected = after((-7199.9,))
+    assert tracker.last_scans() == pytest.approx(one.last_scans(), abs=1e-6)
+    for table, other in zip(tables, expected, strict=True):
+        np.testing.assert_allclose(table.mean, other.mean, atol=1e-6)
+    if engine == "core":
+        tracker.save(tmp_path / "state.npz")
+        assert Tracker.load(tmp_path / "state.npz").last_scans() == tracker.last_scans()
+
+
 # What is damaged.
 
 

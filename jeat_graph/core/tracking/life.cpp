@@ -233,7 +233,7 @@ void end_tracks(State& state, Record* record) {
 void reset(State& state, double t) {
     const std::size_t n = state.tracks.size();
     end(state, std::vector<std::uint8_t>(n, 1), std::vector<std::uint8_t>(n, 0));
-    if (!state.started) return;
+    if (std::isinf(state.learnt_s)) return;  // nothing has come yet
     for (Sensor& sensor : state.sensors) {
         // It has had no scan since: not for less than the time between two of its scans.
         const double period = std::isnan(sensor.period_s) ? state.constants.first_period_s : sensor.period_s;
@@ -243,6 +243,7 @@ void reset(State& state, double t) {
     state.t = t;
     state.started = false;
     state.camera_velocity = {};
+    state.camera_path = {};
 }
 
 double own_p_detect(const State& state, std::size_t row, std::size_t sensor) {

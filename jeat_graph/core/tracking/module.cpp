@@ -196,6 +196,8 @@ public:
         const State& state = now_.state;
         Record* const record = smooths_ ? &record_ : nullptr;
         const bool is_reset = state.started && t - state.t >= kLongestSilenceS;
+        // Time goes on from before the moment that it was to go on from.
+        if (!state.started && t < state.t) tracking::reset(now_.state, t);
         record_.begin(t);
         if (is_reset) record_.is_reset = true, tracking::reset(now_.state, t);
         for (Scan& scan : scans_)
