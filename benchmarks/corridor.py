@@ -40,7 +40,7 @@ _GAP_M, _LINE_M, _SEEN_M = 300.0, 40.0, (22.0, 90.0)
 _SPEED, _SPREAD = 27.0, 0.1
 _WARM_S = 20.0
 _PORTS = (20_000, 32_000)
-_START_S = 60.0
+_START_S = 120.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -84,7 +84,7 @@ def _measured(folder: Path, broker: str, args: argparse.Namespace) -> dict[str, 
     with (folder / "log").open("w") as log:
         process = subprocess.Popen(command, stderr=log)
     try:
-        _wait_until_running(folder / "log", process)
+        _wait_until_running(folder / "log", process, len(names) + 1)
         return _sent(sinks, process.pid, web, args)
     finally:
         process.send_signal(signal.SIGTERM)
@@ -229,9 +229,10 @@ def tables(found: Mapping[str, Any]) -> dict[str, Table]:
     return {"corridor-load": Table.from_records([row], title="One process, many cameras", digits=digits)}
 
 
-def _wait_until_running(log: Path, process: subprocess.Popen[bytes]) -> None:
+def _wait_until_running(log: Path, process: subprocess.Popen[bytes], parts: int) -> None:
+    """Wait for all cameras and the corridor: a broker keeps nothing for who has not subscribed yet."""
     end = time.monotonic() + _START_S
-    while '"text": "running"' not in log.read_text():
+    while log.read_text().count('"text": "running"') < parts:
         if process.poll() is not None or time.monotonic() > end:
             raise ConfigError(f"the service does not run: {log.read_text()[-400:]}")
         time.sleep(0.1)

@@ -29,7 +29,8 @@ EXAMPLES = {
     "eval": "jeat-graph eval run bytetrack.txt --gt gt.csv",
     "compare": "jeat-graph compare run --gt gt.csv --out comparison",
     "count": "jeat-graph count run --line north=200,500,900,520 --interval 900 --out counts.csv",
-    "recount": "jeat-graph recount crossings.csv --video street.mp4 --line north --out recount.html",
+    "recount": "jeat-graph recount crossings.csv --video street.mp4 --line north --lines marks.yaml "
+    "--out recount.html",
     "explain": "jeat-graph explain run --track 7",
     "draw": "jeat-graph draw run --frames street.mp4",
     "frame": "jeat-graph frame street.mp4 --grid --out street.png",

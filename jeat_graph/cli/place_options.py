@@ -43,7 +43,7 @@ def places(args: argparse.Namespace) -> tuple[list[Line], list[Zone]]:
     """
     from jeat_graph.io.tables.marks import LINES, ZONES, read_marks_file
 
-    lines = [_line(text, k) for k, text in enumerate(args.line, 1)]
+    lines = [line_of(text, k) for k, text in enumerate(args.line, 1)]
     zones = [_zone(text, k) for k, text in enumerate(args.zone, 1)]
     for path in args.lines:
         marks = read_marks_file(path, (LINES, ZONES))
@@ -55,7 +55,7 @@ def places(args: argparse.Namespace) -> tuple[list[Line], list[Zone]]:
     return lines, zones
 
 
-def _line(text: str, number: int) -> Line:
+def line_of(text: str, number: int) -> Line:
     """Read `NAME=x1,y1,x2,y2`; without a name it is `line-1` and so on."""
     name, equals, ends = text.rpartition("=")
     try:

@@ -14,10 +14,11 @@ from jeat_graph.drawing.page.document import table_html
 from jeat_graph.drawing.page.head import page_head
 from jeat_graph.eval.tables import Cell, Table
 from jeat_graph.io.files.atomic import open_atomic
+from jeat_graph.road.road_drawings import round_ticks
 
 _WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 960, 260, 56, 30, 10
 _MOST_POINTS = 3000
-_TICKS = 5
+_TICKS = 7
 _MOST_ROWS = 400
 
 
@@ -78,18 +79,26 @@ def scatter_svg(x: FloatArray, y: FloatArray, shade: FloatArray, label: str) -> 
     x, y, shade = x[keep], y[keep], shade[keep]
     span_x = float(x.min()), max(float(x.max()), float(x.min()) + 1.0)
     span_y = 0.0, max(float(np.percentile(y, 99.0)) * 1.2, 1.0)
-    px = _LEFT + (x - span_x[0]) / (span_x[1] - span_x[0]) * (_WIDTH - _LEFT - 10)
-    py = _HEIGHT - _BOTTOM - np.minimum(y / span_y[1], 1.0) * (_HEIGHT - _BOTTOM - _TOP)
+
+    def across(value: FloatArray | float) -> FloatArray:
+        share = (np.asarray(value) - span_x[0]) / (span_x[1] - span_x[0])
+        return np.asarray(_LEFT + share * (_WIDTH - _LEFT - 10))
+
+    def up(value: FloatArray | float) -> FloatArray:
+        share = np.minimum(np.asarray(value) / span_y[1], 1.0)
+        return np.asarray(_HEIGHT - _BOTTOM - share * (_HEIGHT - _BOTTOM - _TOP))
+
     dots = "".join(
         f'<circle cx="{u:.1f}" cy="{v:.1f}" r="2.2" fill="currentColor" fill-opacity="{max(s, 0.1):.2f}"/>'
-        for u, v, s in zip(px.tolist(), py.tolist(), shade.tolist(), strict=True)
+        for u, v, s in zip(across(x).tolist(), up(y).tolist(), shade.tolist(), strict=True)
     )
     marks = "".join(
-        f'<text x="{_LEFT + k / _TICKS * (_WIDTH - _LEFT - 10):.0f}" y="{_HEIGHT - 8}" text-anchor="middle">'
-        f"{span_x[0] + k / _TICKS * (span_x[1] - span_x[0]):.0f}</text>"
-        f'<text x="{_LEFT - 6}" y="{_HEIGHT - _BOTTOM - k / _TICKS * (_HEIGHT - _BOTTOM - _TOP) + 4:.0f}" '
-        f'text-anchor="end">{k / _TICKS * span_y[1]:.1f}</text>'
-        for k in range(_TICKS + 1)
+        f'<text x="{across(value):.0f}" y="{_HEIGHT - 8}" text-anchor="middle">{value:g}</text>'
+        for value in round_ticks(*span_x, _TICKS)
+    )
+    marks += "".join(
+        f'<text x="{_LEFT - 6}" y="{up(value) + 4:.0f}" text-anchor="end">{value:g}</text>'
+        for value in round_ticks(*span_y, _TICKS)
     )
     return (
         f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{escape(label)}" '
@@ -110,5 +119,5 @@ def _table(columns: Columns, title: str) -> Table:
 
 def _cell(value: object) -> Cell:
     if isinstance(value, np.floating):
-        return None if np.isnan(value) else f"{float(value):g}"
+        return None if np.isnan(value) else f"{float(round(value, 1)):g}"
     return value.item() if isinstance(value, np.generic) else str(value)

@@ -111,7 +111,7 @@ def histogram_svg(kmh: FloatArray, span: tuple[float, float], colour: str, label
     for value in (0.0, height.high):
         at = height(value)
         parts.append(f'<text class="tick end" x="30" y="{at + 4}">{value:g}</text>')
-    for value in _ticks(speed.low, speed.high, 6):
+    for value in round_ticks(speed.low, speed.high, 6):
         parts.append(f'<text class="tick mid" x="{speed(value)}" y="{_BAR_HEIGHT - 14}">{value:g}</text>')
     base = height.start
     parts.append(_line("axis", speed.start, base, speed.end, base))
@@ -150,7 +150,8 @@ def _axis(values: FloatArray, start: float, end: float, margin: float) -> _Axis:
     return _Axis(float(low) - margin, float(high) + margin, start, end)
 
 
-def _ticks(low: float, high: float, most: int) -> list[float]:
+def round_ticks(low: float, high: float, most: int) -> list[float]:
+    """Return round numbers between two, about `most` of them at most."""
     span = max(high - low, 1e-9)
     step = 10.0 ** np.floor(np.log10(span / most))
     step *= next(m for m in (1.0, 2.0, 5.0, 10.0) if span / (step * m) <= most)
@@ -160,7 +161,7 @@ def _ticks(low: float, high: float, most: int) -> list[float]:
 
 def _grid(axis: _Axis, across: bool, height: int, name: str) -> list[str]:
     out = []
-    for value in _ticks(axis.low, axis.high, 8 if across else 6):
+    for value in round_ticks(axis.low, axis.high, 8 if across else 6):
         at = axis(value)
         if across:
             out.append(_line("grid", at, _TOP, at, height - _BOTTOM))

@@ -45,7 +45,7 @@ def render_traffic(
     edges = interval_edges(first, last, interval_s, [one.t for one in traffic.passed])
     lines = list(dict.fromkeys(sorted(one.line for one in traffic.passed)))
     span = f"{traffic.clock(first)} to {traffic.clock(last)}"
-    facts = f"{len(traffic.passed)} crossings of {len(lines)} lines · {span}"
+    facts = f"{len(traffic.passed)} crossings of {len(lines)} line{'s' * (len(lines) != 1)} · {span}"
     parts = [
         page_head(f"{traffic.name}: traffic", _STYLE),
         f"<header><h1>Traffic: {escape(traffic.name)}</h1>",
@@ -91,7 +91,7 @@ def _curve(traffic: CountedTraffic, curves: dict[str, list[float]], edges: Float
     known = [value for values in curves.values() for value in values if math.isfinite(value)]
     if not known:
         return f'<p class="quiet">Less than {LEAST_FLOW_S:g} s were observed: no flow an hour.</p>'
-    most = max(*known, 1.0)
+    most = _round_above(max(*known, 1.0))
     wide = (_WIDTH - _LEFT) / (len(edges) - 1)
 
     def height(value: float) -> float:
@@ -118,6 +118,12 @@ def _curve(traffic: CountedTraffic, curves: dict[str, list[float]], edges: Float
         parts.append(f'<path d="{"".join(path)}" fill="none" stroke="{colour}" stroke-width="2"/>')
         parts.append(f'<text x="{_LEFT + 8 + 120 * n}" y="12" style="fill:{colour}">{escape(way)}</text>')
     return _svg(parts, _HEIGHT, f"Vehicles an hour at {line} over time, by direction")
+
+
+def _round_above(value: float) -> float:
+    """Return a round number above a value, with room for the names of the directions above its line."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(m * power for m in (1.2, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 11.0) if m * power > 1.08 * value)
 
 
 def _svg(parts: Sequence[str], height: int, label: str) -> str:

@@ -7,7 +7,7 @@ import queue
 import threading
 import time
 from collections import deque
-from typing import Any
+from typing import Any, NamedTuple
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
@@ -33,6 +33,15 @@ _HEAD_BYTES = 1 + 4 + 2 + 2 + 1
 _TOO_LARGE = 0x95
 
 
+class _Message(NamedTuple):
+    """What has come: its number and quality of service, topic and payload."""
+
+    mid: int
+    qos: int
+    topic: str
+    payload: bytes
+
+
 class MqttSource:
     """Subscription of a topic, wild cards allowed (see `record.Source`).
 
@@ -53,7 +62,7 @@ class MqttSource:
         self.address, self._overdue = address, overdue
         self._notices = notices or Notices()
         self.most_open = address.number("most", MOST_OPEN, low=1, high=_MOST_ASKED)
-        self._waiting: queue.Queue[tuple[int, Any]] = queue.Queue()
+        self._waiting: queue.Queue[tuple[int, _Message]] = queue.Queue()
         self._open: list[tuple[int, int]] = []
         self._settled = threading.Event()
         self._session = 0  # the connection that a message came by: others' message numbers mean nothing
@@ -87,9 +96,10 @@ class MqttSource:
         self._session += 1
 
     def _on_message(self, client: Any, data: Any, message: Any) -> None:
-        self._waiting.put((self._session, message))
+        # Without its properties, which take many times as much memory as what it says.
+        self._waiting.put((self._session, _Message(message.mid, message.qos, message.topic, message.payload)))
 
-    def _pass_over(self, message: Any) -> None:
+    def _pass_over(self, message: _Message) -> None:
         """Take a message of an old subscription as done, and its topic from the session."""
         # Some brokers change the order of the others when one is acknowledged before those that came first.
         if message.qos and not self._open:

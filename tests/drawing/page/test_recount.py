@@ -6,7 +6,9 @@ import json
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +17,15 @@ from scipy.stats import binomtest
 import jeat_graph.drawing.page
 from jeat_graph.cli.main import main
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.drawing.page.head import beside
 from jeat_graph.drawing.page.passages import Passed
-from jeat_graph.drawing.page.recount import drawn_stretches, render_recount
+from jeat_graph.drawing.page.recount import Film, drawn_stretches, render_recount
+from jeat_graph.eval.counting import Line, crossings
+from jeat_graph.eval.zones import Zone
 
+NORTH = Line(100, 200, 500, 200, "north")
+FILM = Film(Path("a.mp4"), (640, 480))
 NODE = shutil.which("node")
 needs_node = pytest.mark.skipif(NODE is None, reason="no node on PATH")
 
@@ -84,8 +91,8 @@ def test_the_page_holds_the_counters_times_of_the_stretches_alone(tmp_path):
     page = render_recount(
         [*passed, Passed("south", "left", "", 61.0, np.nan)],
         drawn_stretches((0.0, 300.0), 60.0, 1, 1),
-        "north",
-        tmp_path / "videos" / "a b.mp4",
+        NORTH,
+        Film(tmp_path / "videos" / "a b.mp4", (640, 480)),
         tmp_path / "page.html",
     )
     data = json.loads(re.search(r'id="data">(.*?)</script>', page).group(1))
@@ -94,12 +101,62 @@ def test_the_page_holds_the_counters_times_of_the_stretches_alone(tmp_path):
     assert times == [t for t in np.arange(0.0, 300.0, 10.0) if one["begin"] - 2.0 <= t < one["end"] + 2.0]
     assert 'src="videos/a%20b.mp4"' in page
     with pytest.raises(DataError, match="there are: north"):
-        render_recount(passed, [], "east", tmp_path / "a.mp4", tmp_path / "page.html")
+        render_recount(passed, [], replace(NORTH, name="east"), FILM, tmp_path / "page.html")
+
+
+def texts_of(page):
+    found = re.findall(r'<text x="([-\d.]+)" y="([-\d.]+)">(.*?)</text>', page)
+    return {text: (float(x), float(y)) for x, y, text in found}
+
+
+def test_the_line_is_drawn_with_the_keys_at_the_sides_that_they_are_of(tmp_path):
+    passed = [Passed("north", way, "", 5.0, np.nan) for way in ("left", "right")]
+    page = render_recount(passed, [], NORTH, FILM, tmp_path / "page.html")
+    assert 'viewBox="0 0 640 480"' in page
+    assert 'points="100,200 500,200"' in page
+    texts = texts_of(page)
+    # Who stands on the first point and looks at the second, to the right, has left above.
+    assert texts["← left"][0] == texts["→ right"][0] == 300.0
+    assert texts["← left"][1] < 200.0 < texts["→ right"][1]
+    back = render_recount(passed, [], Line(500, 200, 100, 200, "north"), FILM, tmp_path / "page.html")
+    assert texts_of(back)["→ right"][1] < 200.0 < texts_of(back)["← left"][1]
+
+
+def test_the_sides_are_those_of_the_counter():
+    t, y = np.arange(9.0), np.linspace(300.0, 100.0, 9)
+    mean = np.zeros((9, 6))
+    mean[:, 0], mean[:, 1] = 300.0, y
+    boxes = np.stack([np.full(9, 290.0), y - 10.0, np.full(9, 20.0), np.full(9, 20.0)], axis=1)
+    tracks = Trajectories(
+        t, np.ones(9, dtype=np.int64), boxes, np.ones(9), mean, np.full((9, 6), 1e-4),
+        np.ones(9, dtype=np.int64), ("rgb",),
+    )  # fmt: skip
+    (one,) = crossings(tracks, NORTH)
+    assert one.direction == "left", "from below to above"
+
+
+def test_a_zone_is_drawn(tmp_path):
+    passed = [Passed("yard", way, "", 5.0, np.nan) for way in ("in", "out")]
+    zone = Zone("yard", ((10.0, 10.0), (110.0, 10.0), (60.0, 100.0)))
+    page = render_recount(passed, [], zone, FILM, tmp_path / "page.html")
+    assert 'points="10,10 110,10 60,100"' in page
+    assert texts_of(page)["← in, → out"] == (60.0, 40.0)
+
+
+def test_where_the_line_is_has_to_be_said(tmp_path, capsys):
+    table, marks = tmp_path / "crossings.csv", tmp_path / "marks.yaml"
+    table.write_text("line,track_id,t,direction\nn,1,5,left\n")
+    marks.write_text("lines: {south: [0, 0, 9, 9]}\n")
+    words = ["recount", str(table), "--video", "a.mp4", "--line", "n", "--out", str(tmp_path / "page.html")]
+    assert main(words) == 2
+    assert "say where 'n' is: --lines FILE.yaml, or --line n=X1,Y1,X2,Y2" in capsys.readouterr().err
+    assert main([*words, "--lines", str(marks)]) == 2
+    assert "has no line or zone 'n': south" in capsys.readouterr().err
 
 
 def test_times_of_a_clock_are_refused(tmp_path, capsys):
     table = tmp_path / "crossings.csv"
     table.write_text("line,track_id,t,time,direction\nn,1,5,1970-01-01T00:00:05,left\n")
-    words = ["recount", str(table), "--video", "a.mp4", "--line", "n", "--out", str(tmp_path / "page.html")]
-    assert main(words) == 2
+    words = ["recount", str(table), "--video", "a.mp4", "--line", "n=0,0,9,9"]
+    assert main([*words, "--out", str(tmp_path / "page.html")]) == 2
     assert "has times of a clock" in capsys.readouterr().err
