@@ -73,6 +73,7 @@ KINDS = {
     ),
     "stale": ("benchmarks.stale", "which tables were made by code that has changed since"),
     "events": ("benchmarks.events", "decoding and representations of events beside other packages"),
+    "decoders": ("benchmarks.decoders", "decoding sparse and dense files of events beside other packages"),
     "event-cameras": (
         "benchmarks.event_cameras",
         "noise of simulated event cameras, and the events of vehicles",

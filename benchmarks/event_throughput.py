@@ -33,12 +33,27 @@ FORMATS = {"evt3": ".raw", "evt2": ".raw", "dat": ".dat"}
 HISTOGRAM, SURFACE = "histogram", "time surface"
 BIN_US, WINDOW_US, DECAY_US = 5_000, 50_000, 50_000.0
 _WINDOW_BINS = WINDOW_US // BIN_US
-#: Of the stream: events a second, the share that lies in runs along a row, and the mean length of a run.
-_RATE_HZ, _IN_RUNS, _RUN_PX = 2e6, 0.7, 6.0
 #: What is meant by one thread, for packages that start their own.
 _ONE_THREAD = ("POLARS_MAX_THREADS", "RAYON_NUM_THREADS", "OMP_NUM_THREADS")
 
 _Dense = npt.NDArray[Any]
+
+
+class StreamShape(NamedTuple):
+    """How events of a drawn stream lie.
+
+    Attributes:
+        rate_hz: events a second.
+        in_runs: share that lies in runs along a row.
+        run_px: mean length of a run.
+    """
+
+    rate_hz: float = 2e6
+    in_runs: float = 0.7
+    run_px: float = 6.0
+
+
+_USUAL = StreamShape()
 
 
 class Work(NamedTuple):
@@ -57,21 +72,22 @@ class Work(NamedTuple):
     right: Callable[[Any], bool]
 
 
-def make_stream(count: int, size_px: tuple[int, int], seed: int) -> EventArray:
-    """Draw `count` events, 2 million a second: runs along rows, as edges that move make, and single ones.
+def make_stream(count: int, size_px: tuple[int, int], seed: int, shape: StreamShape = _USUAL) -> EventArray:
+    """Draw `count` events: runs along rows, as edges that move make, and single ones.
 
     Those that run out of the picture (width, height in `size_px`) are left out.
     """
     rng = np.random.default_rng(seed)
     width, height = size_px
     runs = count  # more than are needed: the stream is cut to its length
-    is_run = rng.random(runs) < _IN_RUNS / (_IN_RUNS + (1.0 - _IN_RUNS) * _RUN_PX)
-    length = np.where(is_run, rng.geometric(1.0 / _RUN_PX, runs), 1)
+    share, mean = shape.in_runs, shape.run_px
+    is_run = rng.random(runs) < share / (share + (1.0 - share) * mean)
+    length = np.where(is_run, rng.geometric(1.0 / mean, runs), 1)
     first = np.cumsum(length) - length
     runs = int(np.searchsorted(first, count))
     length, first = length[:runs], first[:runs]
     run = np.repeat(np.arange(runs), length)[:count]
-    t_run = np.cumsum(rng.exponential(1e6 / _RATE_HZ * length.mean(), runs)).astype(np.int64)
+    t_run = np.cumsum(rng.exponential(1e6 / shape.rate_hz * length.mean(), runs)).astype(np.int64)
     x = rng.integers(0, width, runs)[run] + np.arange(count) - first[run]
     y, polarity = rng.integers(0, height, runs)[run], rng.integers(0, 2, runs)[run]
     keep = x < width

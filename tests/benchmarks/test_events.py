@@ -117,6 +117,20 @@ def test_a_time_surface_decays_from_the_newest_event_of_each_pixel() -> None:
     assert np.count_nonzero(second) == 2
 
 
+def test_sparse_and_dense_files_are_decoded_in_processes_of_their_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A package that is not there is said to fail, and ours gives the events of both streams."""
+    assert main(["decoders", "--quick", "--out", str(tmp_path)]) == 0
+    shown = capsys.readouterr().out
+    assert "EVT3, sparse" in shown
+    assert "DAT, dense" in shown
+    result = json.loads((tmp_path / "decoders.json").read_text(encoding="utf-8"))
+    ours = [row for row in result["decoders"] if row["package"] == OURS]
+    assert len(ours) == 2 * len(FORMATS)
+    assert all(row["why"] == "" and row["mev_s"] > 0.0 for row in ours)
+
+
 def test_who_fails_or_gives_other_events_has_no_figure() -> None:
     def broken() -> int:
         raise OSError("no such format")
