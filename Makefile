@@ -36,6 +36,7 @@ TORCH := torch==2.13.0+cpu
 # The time of all files in wheels: that of the last commit, so that a later build gives the same bytes.
 export SOURCE_DATE_EPOCH ?= $(shell git log -1 --format=%ct 2> /dev/null || date +%s)
 CORE := $(shell find jeat_graph/core -name '*.?pp' -o -name CMakeLists.txt)
+CPP := $(shell find jeat_graph/core tests/core -name '*.?pp')
 SOURCES := $(shell find jeat_graph filters association smoothers eval -name '*.py')
 # What is no part of the tracker's distribution: the simulator and training, and the benchmarks.
 BESIDE := $(shell find sehn/jeat_graph_sehn benchmarks -name '*.py' -o -name '*.yaml')
@@ -92,6 +93,7 @@ fuzz: $(VENV)/.test $(VENV)/.core
 lint: $(VENV)/.lint $(VENV)/.core $(VENV)/.sehn
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
+	@$(BIN)/clang-format --dry-run --Werror $(CPP)
 	@$(BIN)/interrogate --quiet $(DOCUMENTED) || $(BIN)/interrogate -v $(DOCUMENTED)
 	@$(BIN)/python .ci/prose.py
 	@$(BIN)/python .ci/audit.py

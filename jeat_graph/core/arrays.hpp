@@ -74,8 +74,8 @@ template <class T> Out2<T> handed_over(Buffer<T>&& buffer, std::size_t rows, std
 inline void check_lengths(std::initializer_list<std::size_t> lengths) {
     for (const std::size_t length : lengths) {
         if (length != *lengths.begin()) {
-            throw std::invalid_argument("columns of different lengths: " + std::to_string(*lengths.begin()) +
-                                        " and " + std::to_string(length));
+            throw std::invalid_argument("columns of different lengths: " + std::to_string(*lengths.begin()) + " and " +
+                                        std::to_string(length));
         }
     }
 }

@@ -59,7 +59,8 @@ inline double exp_of(double x) {
 
 // ln x = k ln 2 + ln m, sqrt(1/2) <= m < sqrt(2), by the series of artanh.
 inline double log_of(double x) {
-    if (!(x > 0.0)) return x == 0.0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
+    if (!(x > 0.0))
+        return x == 0.0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
     if (x == std::numeric_limits<double>::infinity()) return x;
     double k = 0.0;
     if (x < std::numeric_limits<double>::min()) x *= 18014398509481984.0, k = -54.0;  // 2^54
@@ -130,7 +131,8 @@ inline double log_gamma(double x) {
     while (x < 10.0) product *= x, x += 1.0;
     const double y = 1.0 / (x * x);
     const double series =
-        (1.0 / 12 + y * (-1.0 / 360 + y * (1.0 / 1260 + y * (-1.0 / 1680 + y * (1.0 / 1188 - y * 691.0 / 360360))))) / x;
+        (1.0 / 12 + y * (-1.0 / 360 + y * (1.0 / 1260 + y * (-1.0 / 1680 + y * (1.0 / 1188 - y * 691.0 / 360360))))) /
+        x;
     return (x - 0.5) * log_of(x) - x + 0.91893853320467274 + series - log_of(product);
 }
 

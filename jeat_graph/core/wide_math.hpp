@@ -87,7 +87,8 @@ JEAT_GRAPH_PART void take_log_gamma(Four& x) {
     }
     const Four y = 1.0 / (x * x);
     const Four series =
-        (1.0 / 12 + y * (-1.0 / 360 + y * (1.0 / 1260 + y * (-1.0 / 1680 + y * (1.0 / 1188 - y * 691.0 / 360360))))) / x;
+        (1.0 / 12 + y * (-1.0 / 360 + y * (1.0 / 1260 + y * (-1.0 / 1680 + y * (1.0 / 1188 - y * 691.0 / 360360))))) /
+        x;
     Four log = x;
     take_log(log);
     take_log(product);

@@ -44,8 +44,24 @@ void compare(const std::vector<double>& values) {
 
 int main() {
     const double infinity = std::numeric_limits<double>::infinity();
-    std::vector<double> values{0.0, -0.0, 1.0, -1.0, 708.0, 709.0, -708.0, -709.0, 1e300, -1e300, 5e-324, 1e-310, infinity,
-                               -infinity, std::numeric_limits<double>::quiet_NaN(), 1.41421356237309505, 10.0, 9.999999};
+    std::vector<double> values{0.0,
+                               -0.0,
+                               1.0,
+                               -1.0,
+                               708.0,
+                               709.0,
+                               -708.0,
+                               -709.0,
+                               1e300,
+                               -1e300,
+                               5e-324,
+                               1e-310,
+                               infinity,
+                               -infinity,
+                               std::numeric_limits<double>::quiet_NaN(),
+                               1.41421356237309505,
+                               10.0,
+                               9.999999};
     for (const double x : std::vector(values))
         for (const double way : {-infinity, infinity}) values.push_back(std::nextafter(x, way));
     std::mt19937_64 random(1);

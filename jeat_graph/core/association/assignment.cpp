@@ -36,8 +36,7 @@ const std::vector<std::size_t>& Assignment::solve(std::span<const Pair> pairs, s
             take_greatest(begin, end);
         }
     }
-    std::sort(made_.begin(), made_.end(),
-              [&](std::size_t a, std::size_t b) { return pairs[a].row < pairs[b].row; });
+    std::sort(made_.begin(), made_.end(), [&](std::size_t a, std::size_t b) { return pairs[a].row < pairs[b].row; });
     return made_;
 }
 
@@ -158,8 +157,8 @@ std::size_t Assignment::nearest_column() const {
     for (const std::size_t column : touched_) {
         if (done_[column]) continue;
         const bool nearer = best == none || distance_[column] < distance_[best];
-        const bool ends = best < none && distance_[column] == distance_[best] && column_row_[column] == n &&
-                          column_row_[best] != n;
+        const bool ends =
+            best < none && distance_[column] == distance_[best] && column_row_[column] == n && column_row_[best] != n;
         if (nearer || ends) best = column;
     }
     return best;

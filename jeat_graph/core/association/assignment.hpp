@@ -47,11 +47,11 @@ private:
     std::vector<std::size_t> place_;           // of nodes, in their group
     // Of one group: rows, and columns, behind which each row has one of its own, of gain 0, to stay alone.
     std::vector<std::size_t> group_rows_, group_columns_;
-    std::vector<std::size_t> first_;           // where the pairs of each row begin in order_
+    std::vector<std::size_t> first_;  // where the pairs of each row begin in order_
     std::vector<double> row_price_, column_price_;
-    std::vector<std::size_t> column_row_;      // the row that has a column, number of rows for none
-    std::vector<std::size_t> row_column_;      // the column that a row has
-    std::vector<std::size_t> row_pair_;        // by which pair
+    std::vector<std::size_t> column_row_;  // the row that has a column, number of rows for none
+    std::vector<std::size_t> row_column_;  // the column that a row has
+    std::vector<std::size_t> row_pair_;    // by which pair
     // Of the search from one row: how far columns are, from which row, by which pair, and those that were reached.
     double reached_ = 0.0;
     std::vector<double> distance_;

@@ -87,8 +87,8 @@ inline bool any_touches(std::span<const Sides> boxes, double number) {
 inline constexpr std::size_t kMostAtOnce = 2048;
 
 // Places of the boxes that count, ascending.
-inline std::vector<std::int64_t> kept_boxes(std::span<const Sides> boxes, std::span<const double> scores, double most_on_one_spot,
-                                            double spot_overlap, double most_touching) {
+inline std::vector<std::int64_t> kept_boxes(std::span<const Sides> boxes, std::span<const double> scores,
+                                            double most_on_one_spot, double spot_overlap, double most_touching) {
     std::vector<std::int64_t> order(boxes.size()), out;
     std::iota(order.begin(), order.end(), std::int64_t{0});
     if (boxes.size() <= kMostAtOnce && spot_overlap > 0.0 &&

@@ -49,7 +49,8 @@ struct Gates {
         for (int axis = 0; axis < 2; ++axis)
             cut_peak = std::max(cut_peak, -0.5 * expected.log_det[1 - axis] - expected.log_size[axis] -
                                               0.5 * std::min(expected.log_left[axis], expected.log_right[axis]));
-        cut_peak += std::max(terms.logs.cut, terms.logs.uncovered) - 1.5 * filters::kLog2Pi + 2.0 * kLn2High;  // of four
+        cut_peak +=
+            std::max(terms.logs.cut, terms.logs.uncovered) - 1.5 * filters::kLog2Pi + 2.0 * kLn2High;  // of four
         cut = clamp(2.0 * (cut_peak + enough), 0.0, c.cut_gate);
     }
 };
@@ -63,7 +64,8 @@ inline double cut_log_density(const std::array<double, 4>& y, const std::array<d
         const double left = y[2 * axis], right = y[2 * axis + 1], size = expected.size[axis];
         const double d2 = distances[1 - axis];
         if (d2 > c.cut_gate) continue;
-        const double whole = -0.5 * d2 - 0.5 * expected.log_det[1 - axis] - 1.5 * filters::kLog2Pi - expected.log_size[axis];
+        const double whole =
+            -0.5 * d2 - 0.5 * expected.log_det[1 - axis] - 1.5 * filters::kLog2Pi - expected.log_size[axis];
         const auto with = [&](double other, double variance, double log_variance, double inwards) {
             const double alone = other * other / variance;
             if (inwards >= size || inwards <= -c.most_uncovered * size || d2 + alone > c.cut_gate) return;

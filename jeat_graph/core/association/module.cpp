@@ -77,11 +77,12 @@ void bind(nb::module_& module) {
                nb::arg("gain").noconvert(), nb::arg("nodes"),
                "Of links (E,) from tail to head the set of greatest sum, at most one from and one to each node: the\n"
                "number of each node's (N,), -1 for none.");
-    module.def("sample_links", &sample_links, nb::arg("tail").noconvert(), nb::arg("head").noconvert(),
-               nb::arg("gain").noconvert(), nb::arg("start").noconvert(), nb::arg("samples"), nb::arg("sweeps"),
-               nb::arg("seed"),
-               "Such sets drawn with probabilities that go as exp(sum of gains): numbers of the nodes' links\n"
-               "(samples, N), -1 for none. start (N,): the set before the first, with `sweeps` draws of each link between.");
+    module.def(
+        "sample_links", &sample_links, nb::arg("tail").noconvert(), nb::arg("head").noconvert(),
+        nb::arg("gain").noconvert(), nb::arg("start").noconvert(), nb::arg("samples"), nb::arg("sweeps"),
+        nb::arg("seed"),
+        "Such sets drawn with probabilities that go as exp(sum of gains): numbers of the nodes' links\n"
+        "(samples, N), -1 for none. start (N,): the set before the first, with `sweeps` draws of each link between.");
 }
 
 }  // namespace jeat::association

@@ -23,7 +23,7 @@ inline constexpr float FOLLOWED_SIGMAS = 1.0F, FOLLOWED_EVENTS = 0.5F;
 
 // Lets means follow the sums around; `kept` is -1 where a sum stands out, else 0.
 JEAT_GRAPH_WIDE static void follow(const float* around, float* mean, const Usual& how, std::int32_t* kept,
-                            std::size_t size) {
+                                   std::size_t size) {
     const auto [sigmas, quick, slow] = how;
     for (std::size_t k = 0; k < size; ++k) {
         const float usual = mean[k], now = around[k], change = now - usual, sigma = std::sqrt(usual);
@@ -39,8 +39,8 @@ JEAT_GRAPH_WIDE static void follow(const float* around, float* mean, const Usual
 //
 // Of what does not stand out the means are at first those of all windows so far; what does is followed slowly
 // from the first on, or a slow vehicle would be usual before it has left its place.
-inline void mark_unusual(std::span<const std::uint16_t> counts, std::span<const float> around,
-                         std::span<float> mean, const Usual& how, std::span<std::uint16_t> out) {
+inline void mark_unusual(std::span<const std::uint16_t> counts, std::span<const float> around, std::span<float> mean,
+                         const Usual& how, std::span<std::uint16_t> out) {
     // In two loops over numbers of one size each: so they become vectors.
     constexpr std::size_t PART = 1024;
     std::array<std::int32_t, PART> kept;

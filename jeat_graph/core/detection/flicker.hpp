@@ -47,4 +47,4 @@ inline void leave_flicker(std::span<const std::int64_t> t, const Places& places,
     }
 }
 
-} // namespace jeat::detection
+}  // namespace jeat::detection

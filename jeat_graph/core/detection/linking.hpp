@@ -80,7 +80,7 @@ inline void or_few_rows(const std::uint64_t* bits, std::size_t rows, std::uint64
 
 // The same with wider vectors, which pays where there are more rows than FEW_ROWS.
 JEAT_GRAPH_WIDE static void or_many_rows(const std::uint64_t* bits, std::size_t rows, std::uint64_t* line,
-                                  std::size_t words) {
+                                         std::size_t words) {
     or_few_rows(bits, rows, line, words);
 }
 inline constexpr std::size_t FEW_ROWS = 4;
@@ -164,8 +164,7 @@ inline Parents joined(const Runs& runs, std::int32_t link) {
 // Number of each group at its first run, from 1 in the order of blocks of 2 x 2; 0 where it is too light.
 inline std::pair<std::vector<std::int32_t>, std::int64_t> numbered(const Parents& parent,
                                                                    const std::vector<std::int64_t>& size,
-                                                                   const Runs& runs, std::int32_t link,
-                                                                   double least) {
+                                                                   const Runs& runs, std::int32_t link, double least) {
     const std::int32_t left = link - 1 - link / 2;
     std::vector<std::int64_t> place(parent.size(), std::numeric_limits<std::int64_t>::max());
     for (std::size_t row = 0; row + 1 < runs.begin.size(); ++row) {

@@ -89,13 +89,13 @@ void bind_windows(nb::module_& module) {
             const Release release;
             empty_cells(columns, rows, bin);
         },
-        nb::arg("x").noconvert(), nb::arg("y").noconvert(), nb::arg("slot").noconvert(),
-        nb::arg("total").noconvert(), "Empty the cells of a bin's events, and take them off the total (H, W).");
+        nb::arg("x").noconvert(), nb::arg("y").noconvert(), nb::arg("slot").noconvert(), nb::arg("total").noconvert(),
+        "Empty the cells of a bin's events, and take them off the total (H, W).");
     module.def("events_of_few", summing(events_of_few), nb::arg("ring").noconvert(), nb::arg("slots").noconvert(),
                nb::arg("y").noconvert(), nb::arg("x").noconvert(),
                "Return the events (P,) of pixels in some bins of a ring (bins, 2, H, W).");
-    module.def("events_of_many", summing(events_of_many), nb::arg("ring").noconvert(),
-               nb::arg("slots").noconvert(), nb::arg("y").noconvert(), nb::arg("x").noconvert(),
+    module.def("events_of_many", summing(events_of_many), nb::arg("ring").noconvert(), nb::arg("slots").noconvert(),
+               nb::arg("y").noconvert(), nb::arg("x").noconvert(),
                "Return the same, faster where many pixels are asked for.");
 }
 
@@ -163,8 +163,7 @@ void bind_memory(nb::module_& module) {
             return std::tuple(handed_over(std::move(inside), names, own.size()),
                               handed_over(std::move(near), names, own.size()), handed_over(std::move(count)));
         },
-        nb::arg("marked").noconvert(), nb::arg("boxes").noconvert(), nb::arg("around").noconvert(),
-        nb::arg("names"),
+        nb::arg("marked").noconvert(), nb::arg("boxes").noconvert(), nb::arg("around").noconvert(), nb::arg("names"),
         "Return how many pixels of each cloud lie in each box and in the one around it (names, K), and in all.");
     module.def(
         "nearest_boxes",
@@ -248,8 +247,8 @@ void bind_noise(nb::module_& module) {
     module.def(
         "leave_flicker",
         [](In<std::int64_t> t, In<std::uint16_t> x, In<std::uint16_t> y, In<std::uint8_t> polarity,
-           Out2<std::int64_t> rise, Out2<std::uint8_t> state, std::tuple<std::int64_t, std::int64_t, std::int64_t, int> rule,
-           Out<bool> good) {
+           Out2<std::int64_t> rise, Out2<std::uint8_t> state,
+           std::tuple<std::int64_t, std::int64_t, std::int64_t, int> rule, Out<bool> good) {
             check_lengths({t.size(), x.size(), y.size(), polarity.size(), good.size()});
             check(rise.shape(0) == state.shape(0) && rise.shape(1) == state.shape(1), "both are of the picture's size");
             const auto [shortest, longest, forgotten, least] = rule;
@@ -264,9 +263,8 @@ void bind_noise(nb::module_& module) {
             const Release release;
             leave_flicker(times, places, signs, rises, states, known, found);
         },
-        nb::arg("t").noconvert(), nb::arg("x").noconvert(), nb::arg("y").noconvert(),
-        nb::arg("polarity").noconvert(), nb::arg("rise").noconvert(), nb::arg("state").noconvert(), nb::arg("rule"),
-        nb::arg("good").noconvert(),
+        nb::arg("t").noconvert(), nb::arg("x").noconvert(), nb::arg("y").noconvert(), nb::arg("polarity").noconvert(),
+        nb::arg("rise").noconvert(), nb::arg("state").noconvert(), nb::arg("rule"), nb::arg("good").noconvert(),
         "Unmark the events of pixels that flicker: `rise` (H, W; us) and `state` (H, W) are theirs.");
     module.def(
         "take_events",
@@ -280,16 +278,17 @@ void bind_noise(nb::module_& module) {
             Buffer<std::uint8_t> out_p(room);
             {
                 const Release release;
-                const TakenEvents out{{out_t.data.get(), room}, {out_x.data.get(), room}, {out_y.data.get(), room},
+                const TakenEvents out{{out_t.data.get(), room},
+                                      {out_x.data.get(), room},
+                                      {out_y.data.get(), room},
                                       {out_p.data.get(), room}};
                 out_t.used = out_x.used = out_y.used = out_p.used = take_events(events, marks, out);
             }
             return std::tuple(handed_over(std::move(out_t)), handed_over(std::move(out_x)),
                               handed_over(std::move(out_y)), handed_over(std::move(out_p)));
         },
-        nb::arg("t").noconvert(), nb::arg("x").noconvert(), nb::arg("y").noconvert(),
-        nb::arg("polarity").noconvert(), nb::arg("good").noconvert(),
-        "Return times, columns, rows and polarities of the events that are marked (N,).");
+        nb::arg("t").noconvert(), nb::arg("x").noconvert(), nb::arg("y").noconvert(), nb::arg("polarity").noconvert(),
+        nb::arg("good").noconvert(), "Return times, columns, rows and polarities of the events that are marked (N,).");
 }
 
 void bind_picture_detector(nb::module_& module) {

@@ -85,9 +85,9 @@ inline std::pair<std::int64_t, double> usual_difference(View2<const std::uint8_t
 
 // Marks the pixels that differ by more than both limits; returns how many do.
 JEAT_GRAPH_WIDE static std::int64_t mark_different(std::span<const std::uint8_t> grey,
-                                            std::span<const std::uint8_t> background, std::int32_t brighter,
-                                            std::int32_t limit, std::span<const std::int16_t> limits,
-                                            std::uint8_t* marks) {
+                                                   std::span<const std::uint8_t> background, std::int32_t brighter,
+                                                   std::int32_t limit, std::span<const std::int16_t> limits,
+                                                   std::uint8_t* marks) {
     std::int64_t number = 0;
     // In parts whose number fits into 32 bits of a register of several.
     constexpr std::size_t PART = 1 << 14;

@@ -91,7 +91,7 @@ inline void events_of_few(const Ring& ring, std::span<const std::int32_t> y, std
 
 // Adds the cells of a bin to sums.
 JEAT_GRAPH_WIDE static void add_cells(const std::uint8_t* darker, const std::uint8_t* brighter, std::uint16_t* sum,
-                               std::size_t size) {
+                                      std::size_t size) {
     for (std::size_t k = 0; k < size; ++k) {
         sum[k] = static_cast<std::uint16_t>(sum[k] + darker[k] + brighter[k]);
     }

@@ -12,9 +12,8 @@ constexpr std::int64_t swapped(std::uint32_t word) {
 }
 
 // Decodes words until they, or the room, end; returns how many were used. `davis`: else a DVS128.
-template <bool davis>
-std::size_t decode(std::span<const std::uint64_t> words, DecoderState& state, const Columns& out,
-                   const Triggers& triggers, const Limits& limits) {
+template <bool davis> std::size_t decode(std::span<const std::uint64_t> words, DecoderState& state, const Columns& out,
+                                         const Triggers& triggers, const Limits& limits) {
     auto n = static_cast<std::size_t>(state.filled), m = static_cast<std::size_t>(state.triggers);
     std::int64_t turns = state.wraps, last = state.last, low = state.high;
     std::int64_t time = turns << CLOCK_BITS;

@@ -17,9 +17,8 @@ inline Leap leap_of(std::span<const std::uint64_t> words, std::size_t k, std::in
 }
 
 // Decodes words until they, or the room, end, or the state waits for more; returns how many were used.
-template <int x_bits, int y_bits>
-std::size_t decode(std::span<const std::uint64_t> words, DecoderState& state, const Columns& out,
-                   const Limits& limits) {
+template <int x_bits, int y_bits> std::size_t decode(std::span<const std::uint64_t> words, DecoderState& state,
+                                                     const Columns& out, const Limits& limits) {
     auto n = static_cast<std::size_t>(state.filled);
     std::int64_t turns = state.wraps, last = state.last, low = state.high;
     std::int64_t time = turns << CLOCK_BITS;

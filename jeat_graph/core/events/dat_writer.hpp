@@ -13,8 +13,8 @@ inline constexpr int SIDE_BITS = 14;
 inline Encoded encode(const Events& events, std::span<std::uint64_t> words) {
     const std::size_t count = std::min(events.t.size(), words.size());
     for (std::size_t k = 0; k < count; ++k) {
-        const std::uint64_t address = std::uint64_t{events.p[k] > 0} << (2 * SIDE_BITS) |
-                                      std::uint64_t{events.y[k]} << SIDE_BITS | events.x[k];
+        const std::uint64_t address =
+            std::uint64_t{events.p[k] > 0} << (2 * SIDE_BITS) | std::uint64_t{events.y[k]} << SIDE_BITS | events.x[k];
         words[k] = address << 32 | (static_cast<std::uint64_t>(events.t[k]) & 0xFFFFFFFFu);
     }
     return {count, count};

@@ -24,17 +24,17 @@ inline constexpr std::size_t MOST_AHEAD = std::size_t{1} << 20;
 
 // What a loop keeps from block to block. Times are in µs; -1 where none is known.
 struct DecoderState {
-    std::int64_t filled = 0;      // events in the room
-    std::int64_t triggers = 0;    // edges in their room
-    std::int64_t last = -1;       // the latest time so far, which no later event lies before
-    std::int64_t previous = -1;   // own time of the events before
-    std::int64_t high = -1;       // counter of the time's upper bits, or the clock
-    std::int64_t wraps = 0;       // how often it began again
-    std::int64_t low = 0;         // low bits of the time
-    std::int64_t row = -1;        // row of the events that follow
-    std::int64_t base = 0;        // first column of the next group
-    std::int64_t polarity = 0;    // of the groups that follow
-    std::int64_t outside = 0;     // the counts of `Damage` in jeat_graph/io/events/reader.py
+    std::int64_t filled = 0;     // events in the room
+    std::int64_t triggers = 0;   // edges in their room
+    std::int64_t last = -1;      // the latest time so far, which no later event lies before
+    std::int64_t previous = -1;  // own time of the events before
+    std::int64_t high = -1;      // counter of the time's upper bits, or the clock
+    std::int64_t wraps = 0;      // how often it began again
+    std::int64_t low = 0;        // low bits of the time
+    std::int64_t row = -1;       // row of the events that follow
+    std::int64_t base = 0;       // first column of the next group
+    std::int64_t polarity = 0;   // of the groups that follow
+    std::int64_t outside = 0;    // the counts of `Damage` in jeat_graph/io/events/reader.py
     std::int64_t backwards = 0;
     std::int64_t held = 0;
     std::int64_t held_from_us = -1;
@@ -43,8 +43,8 @@ struct DecoderState {
     std::int64_t untimed = 0;
     std::int64_t jumps = 0;
     std::int64_t leaps = 0;
-    bool ended = false;           // whether no words follow those that are given
-    bool waits = false;           // whether the loop stopped for words that are not there yet
+    bool ended = false;  // whether no words follow those that are given
+    bool waits = false;  // whether the loop stopped for words that are not there yet
 };
 
 // Room for events; all four of one length.
@@ -83,8 +83,8 @@ constexpr bool leaps(std::int64_t now, std::int64_t old, int low_bits) {
 // counter does not begin again there, it would run backwards: no sound file has such a leap, and a gap in a
 // recording is none. `old`, `now` and `after` are the values before the leap, of it and after it (-1 if none
 // has come yet), `full` the number of values, `left` the words that are there from the one that leaps on.
-inline Leap kind_of_leap(std::int64_t old, std::int64_t now, std::int64_t after, std::int64_t full,
-                         std::size_t left, DecoderState& state) {
+inline Leap kind_of_leap(std::int64_t old, std::int64_t now, std::int64_t after, std::int64_t full, std::size_t left,
+                         DecoderState& state) {
     if (after < 0 && !state.ended && left < MOST_AHEAD) {
         state.waits = true;
         return Leap::open;
@@ -104,8 +104,8 @@ inline void hold(std::int64_t count, std::int64_t t, std::int64_t last, DecoderS
 }
 
 // How often a counter of `bits` of the time above `low_bits` (µs) began again; a jump ahead is remarked on.
-inline std::int64_t turns_of_counter(std::int64_t now, std::int64_t old, std::int64_t turns, int bits,
-                                     int low_bits, DecoderState& state) {
+inline std::int64_t turns_of_counter(std::int64_t now, std::int64_t old, std::int64_t turns, int bits, int low_bits,
+                                     DecoderState& state) {
     if (wraps(old, now, std::int64_t{1} << bits)) return turns + 1;
     if (old >= 0 && now - old > JUMP_US >> low_bits) ++state.jumps;
     return turns;
@@ -113,8 +113,7 @@ inline std::int64_t turns_of_counter(std::int64_t now, std::int64_t old, std::in
 
 // How often a clock of `CLOCK_BITS` began again; a jump and a step back are remarked on. To be asked where it
 // does neither go on nor stand still, by at most `LEAP_US`: most events have no need.
-inline std::int64_t turns_of_clock(std::int64_t now, std::int64_t old, std::int64_t turns,
-                                   DecoderState& state) {
+inline std::int64_t turns_of_clock(std::int64_t now, std::int64_t old, std::int64_t turns, DecoderState& state) {
     if (now < old) {
         if (wraps(old, now, std::int64_t{1} << CLOCK_BITS)) return turns + 1;
         ++state.backwards;

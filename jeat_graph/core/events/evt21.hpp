@@ -12,9 +12,7 @@ template <bool swapped> struct Halves {
     static std::int64_t upper(std::uint64_t word) {
         return static_cast<std::int64_t>(swapped ? word & 0xFFFFFFFFu : word >> 32);
     }
-    static std::uint32_t columns(std::uint64_t word) {
-        return static_cast<std::uint32_t>(swapped ? word >> 32 : word);
-    }
+    static std::uint32_t columns(std::uint64_t word) { return static_cast<std::uint32_t>(swapped ? word >> 32 : word); }
 };
 
 // Counts the events of a word, bits of which the first `most` lie in the picture, as `hold` does.
@@ -26,9 +24,8 @@ inline void hold_columns(std::uint32_t columns, std::int64_t most, std::int64_t 
 }
 
 // Decodes words till they or the room end (see evt2::decode); `swapped`: the upper half of each comes first.
-template <bool swapped>
-std::size_t decode(std::span<const std::uint64_t> words, DecoderState& state, const Columns& out,
-                   const Triggers& triggers, const Limits& limits) {
+template <bool swapped> std::size_t decode(std::span<const std::uint64_t> words, DecoderState& state,
+                                           const Columns& out, const Triggers& triggers, const Limits& limits) {
     using evt2::SIDE, evt2::TIME;
     auto n = static_cast<std::size_t>(state.filled);
     std::int64_t last = state.last, previous = state.previous;
@@ -56,8 +53,7 @@ std::size_t decode(std::span<const std::uint64_t> words, DecoderState& state, co
                 if (is_kept(column, y, time >= 0, limits, state)) put_event(out, n++, last, column, y, kind);
             }
         } else {
-            const Leap leap =
-                kind == TIME ? evt2::leap_of(words, k, state, Halves<swapped>::upper) : Leap::none;
+            const Leap leap = kind == TIME ? evt2::leap_of(words, k, state, Halves<swapped>::upper) : Leap::none;
             if (leap == Leap::lone) continue;
             if (leap == Leap::open || !evt2::take_other(word, triggers, state)) {
                 used = k;

@@ -30,8 +30,7 @@ struct ColumnsOfBits {
 inline constexpr ColumnsOfBits COLUMNS_OF_BITS;
 
 // What leap from `high` the time of word `k` is, by the next time.
-inline Leap leap_of(std::span<const std::uint16_t> words, std::size_t k, std::int64_t high,
-                    DecoderState& state) {
+inline Leap leap_of(std::span<const std::uint16_t> words, std::size_t k, std::int64_t high, DecoderState& state) {
     const std::int64_t now = words[k] & BITS;
     if (!leaps(now, high, LOW_BITS)) return Leap::none;
     std::int64_t after = -1;
@@ -48,10 +47,10 @@ inline Leap leap_of(std::span<const std::uint16_t> words, std::size_t k, std::in
 class Decoder {
 public:
     Decoder(DecoderState& state, const Columns& out, const Triggers& triggers, const Limits& limits)
-        : state_(state), out_(out), triggers_(triggers), limits_(limits),
-          n_(static_cast<std::size_t>(state.filled)), m_(static_cast<std::size_t>(state.triggers)),
-          high_(state.high), low_(state.low), turns_(state.wraps), row_(state.row), base_(state.base),
-          polarity_(state.polarity), last_(state.last), previous_(state.previous), time_(time()), late_from_(n_) {}
+        : state_(state), out_(out), triggers_(triggers), limits_(limits), n_(static_cast<std::size_t>(state.filled)),
+          m_(static_cast<std::size_t>(state.triggers)), high_(state.high), low_(state.low), turns_(state.wraps),
+          row_(state.row), base_(state.base), polarity_(state.polarity), last_(state.last), previous_(state.previous),
+          time_(time()), late_from_(n_) {}
 
     std::size_t decode(std::span<const std::uint16_t> words) {
         std::size_t k = 0;
@@ -187,8 +186,8 @@ private:
     }
 
     // Writes those events of a group that lie in the picture, and returns the next row.
-    static std::size_t put_inside(const Columns& out, std::size_t n, unsigned bits, std::int64_t t,
-                                  std::int64_t first, std::int64_t row, std::int64_t polarity, const Limits& limits) {
+    static std::size_t put_inside(const Columns& out, std::size_t n, unsigned bits, std::int64_t t, std::int64_t first,
+                                  std::int64_t row, std::int64_t polarity, const Limits& limits) {
         for (; bits != 0; bits &= bits - 1) {
             const std::int64_t x = first + std::countr_zero(bits);
             if (x < limits.width && row < limits.height) put_event(out, n++, t, x, row, polarity);

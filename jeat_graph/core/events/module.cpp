@@ -35,7 +35,8 @@ Triggers triggers_of(const EdgeRoom& room) {
 bool fits(std::int64_t filled, std::size_t room) { return filled >= 0 && static_cast<std::size_t>(filled) <= room; }
 
 // Binds a loop over words of one type; decode(words, state, columns, triggers, limits) -> words used.
-template <class Word, class Decode> void bind_decoder(nb::module_& module, const char* name, const char* doc, Decode decode) {
+template <class Word, class Decode>
+void bind_decoder(nb::module_& module, const char* name, const char* doc, Decode decode) {
     module.def(
         name,
         [decode](In<Word> words, DecoderState& state, Room out, EdgeRoom triggers, Side limits) {
@@ -55,12 +56,13 @@ template <class Word, class Decode> void bind_decoder(nb::module_& module, const
             state = now;
             return used;
         },
-        nb::arg("words").noconvert(), nb::arg("state"), nb::arg("out").noconvert(),
-        nb::arg("triggers").noconvert(), nb::arg("limits"), doc);
+        nb::arg("words").noconvert(), nb::arg("state"), nb::arg("out").noconvert(), nb::arg("triggers").noconvert(),
+        nb::arg("limits"), doc);
 }
 
 // Binds an encoder to words of one type; encode(events, words, state) -> events taken, words written.
-template <class Word, class Encode> void bind_encoder(nb::module_& module, const char* name, const char* doc, Encode encode) {
+template <class Word, class Encode>
+void bind_encoder(nb::module_& module, const char* name, const char* doc, Encode encode) {
     module.def(
         name,
         [encode](In<std::int64_t> t, In<std::uint16_t> x, In<std::uint16_t> y, In<std::uint8_t> polarity,
@@ -76,8 +78,8 @@ template <class Word, class Encode> void bind_encoder(nb::module_& module, const
             state = now;
             return done;
         },
-        nb::arg("t").noconvert(), nb::arg("x").noconvert(), nb::arg("y").noconvert(),
-        nb::arg("polarity").noconvert(), nb::arg("words").noconvert(), nb::arg("state"), doc);
+        nb::arg("t").noconvert(), nb::arg("x").noconvert(), nb::arg("y").noconvert(), nb::arg("polarity").noconvert(),
+        nb::arg("words").noconvert(), nb::arg("state"), doc);
 }
 
 void bind_states(nb::module_& module) {
@@ -122,15 +124,13 @@ void bind(nb::module_& module) {
     bind_decoder<std::uint64_t>(module, "decode_dat_1", "Decode DAT of version 1, of cameras of 304 x 240 px.",
                                 dat(dat::decode<9, 8>));
     bind_decoder<std::uint64_t>(module, "decode_aedat2_davis", "Decode AEDAT 2.0 of a DAVIS.", aedat2::decode<true>);
-    bind_decoder<std::uint64_t>(module, "decode_aedat2_dvs128", "Decode AEDAT 2.0 of a DVS128.",
-                                aedat2::decode<false>);
+    bind_decoder<std::uint64_t>(module, "decode_aedat2_dvs128", "Decode AEDAT 2.0 of a DVS128.", aedat2::decode<false>);
     bind_encoder<std::uint32_t>(module, "encode_evt2", "Encode EVT 2.0; see `jeat_graph.io.events.word_writer.Encode`.",
                                 evt2::encode);
     bind_encoder<std::uint16_t>(module, "encode_evt3", "Encode EVT 3.0.", evt3::encode);
-    bind_encoder<std::uint64_t>(module, "encode_dat", "Encode DAT.",
-                                [](const Events& events, std::span<std::uint64_t> words, EncoderState&) {
-                                    return dat::encode(events, words);
-                                });
+    bind_encoder<std::uint64_t>(
+        module, "encode_dat", "Encode DAT.",
+        [](const Events& events, std::span<std::uint64_t> words, EncoderState&) { return dat::encode(events, words); });
 }
 
 }  // namespace jeat::events

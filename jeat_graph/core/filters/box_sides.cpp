@@ -43,7 +43,8 @@ JEAT_GRAPH_PART void expected_size(const double* mean, Four& out) {
 }
 
 // Update one axis by its two sides, whose variances are R, in Joseph's form.
-JEAT_GRAPH_PART void update_axis(double* mean, double* P, double left, double right, double size, double Rl, double Rr) {
+JEAT_GRAPH_PART void update_axis(double* mean, double* P, double left, double right, double size, double Rl,
+                                 double Rr) {
     const double half = size / 2.0;
     double PHl[kRow] = {}, PHr[kRow] = {};
     for (int i = 0; i < kStates; ++i) {
@@ -80,7 +81,7 @@ JEAT_GRAPH_PART void update_axis(double* mean, double* P, double left, double ri
 // Where it is likelier that a side has been cut so far and now shows further out than that both sides measure as
 // before, nothing is known of that side: the state takes it as it is measured, and P grows by d^2 along it.
 bool uncover(double* mean, double* P, double& left, double& right, const SidesExpected& expected, int axis,
-                    const ShareLogs& logs, const ModelConstants& c) {
+             const ShareLogs& logs, const ModelConstants& c) {
     bool shows = false;
     const Pair2& S = expected.S[axis];
     const double size = expected.size[axis];
@@ -105,7 +106,7 @@ bool uncover(double* mean, double* P, double& left, double& right, const SidesEx
 }  // namespace
 
 JEAT_GRAPH_WIDE SidesExpected expected_sides(const double* mean, const double* covariance, double rho2,
-                                    const ModelConstants& c) {
+                                             const ModelConstants& c) {
     SidesExpected out;
     Four size;
     expected_size(mean, size);
@@ -114,7 +115,9 @@ JEAT_GRAPH_WIDE SidesExpected expected_sides(const double* mean, const double* c
     const double both = std::sqrt(out.size[0] * out.size[1]);
     for (int axis = 0; axis < 2; ++axis) {
         const double* const P = covariance + axis * kMatrix;
-        const auto sum = [P](int i, int j, int k, int l) { return P[i * kStates + k] + P[i * kStates + l] + P[j * kStates + k] + P[j * kStates + l]; };
+        const auto sum = [P](int i, int j, int k, int l) {
+            return P[i * kStates + k] + P[i * kStates + l] + P[j * kStates + k] + P[j * kStates + l];
+        };
         const double w = out.size[axis], a = sum(kPosition, kPositionError, kPosition, kPositionError);
         const double b = w * sum(kPosition, kPositionError, kLogSize, kSizeError);
         const double d = w * w / 4.0 * sum(kLogSize, kSizeError, kLogSize, kSizeError);
@@ -129,18 +132,18 @@ JEAT_GRAPH_WIDE SidesExpected expected_sides(const double* mean, const double* c
 }
 
 bool uncover_sides(double* mean, double* covariance, std::array<double, 4>& y, const SidesExpected& expected,
-                          const Edges& unmeasured, const ShareLogs& logs, const ModelConstants& c) {
+                   const Edges& unmeasured, const ShareLogs& logs, const ModelConstants& c) {
     bool shows = false;
     for (int axis = 0; axis < 2; ++axis)
         if (!unmeasured.at[2 * axis] && !unmeasured.at[2 * axis + 1])
-            shows |= uncover(mean + axis * kStates, covariance + axis * kMatrix, y[2 * axis], y[2 * axis + 1],
-                             expected, axis, logs, c);
+            shows |= uncover(mean + axis * kStates, covariance + axis * kMatrix, y[2 * axis], y[2 * axis + 1], expected,
+                             axis, logs, c);
     return shows;
 }
 
 JEAT_GRAPH_WIDE void update(double* mean, double* covariance, const std::array<double, 4>& y,
-                            const std::array<double, 4>& left_over, const SidesExpected& expected, const Edges& unmeasured,
-                            const ShareLogs& logs, const ModelConstants& c) {
+                            const std::array<double, 4>& left_over, const SidesExpected& expected,
+                            const Edges& unmeasured, const ShareLogs& logs, const ModelConstants& c) {
     const double heavy = 1.0 / student_weight(squared_distance(y, expected.S), c);
     Four cut, size;
     cut_probabilities(y, expected, logs, cut);

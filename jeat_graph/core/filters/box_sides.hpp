@@ -59,8 +59,7 @@ SidesExpected expected_sides(const double* mean, const double* covariance, doubl
 
 // Innovations of the sides by axis: left, right, top, bottom.
 inline std::array<double, 4> side_innovations(const Sides& box, const Sides& expected) {
-    return {box.left - expected.left, box.right - expected.right, box.top - expected.top,
-            box.bottom - expected.bottom};
+    return {box.left - expected.left, box.right - expected.right, box.top - expected.top, box.bottom - expected.bottom};
 }
 
 // Which sides of a box lie at the edge of the picture: left, right, top, bottom.
@@ -77,7 +76,8 @@ inline Edges edges_of(const Sides& box, double width, double height, const Model
 
 // Sides at the edge that lie inwards of what is expected: the edge has cut them, and they measure nothing.
 inline Edges unmeasured_sides(const std::array<double, 4>& y, const Edges& edges) {
-    return {{edges.at[0] && y[0] > 0.0, edges.at[1] && y[1] < 0.0, edges.at[2] && y[2] > 0.0, edges.at[3] && y[3] < 0.0}};
+    return {
+        {edges.at[0] && y[0] > 0.0, edges.at[1] && y[1] < 0.0, edges.at[2] && y[2] > 0.0, edges.at[3] && y[3] < 0.0}};
 }
 
 // What is expected of a box whose sides are cut by the edge: they lie anywhere within about the object.
@@ -114,8 +114,9 @@ void update(double* mean, double* covariance, const std::array<double, 4>& y, co
             const SidesExpected& expected, const Edges& unmeasured, const ShareLogs& logs, const ModelConstants& c);
 
 // The state of a track that begins at a box; `more` is what the variances of its sides are more by its own spread.
-inline void initial_state(const Sides& box, const Edges& edges, double rho2, double scene_rho2, const std::array<double, 4>& more,
-                          const ModelConstants& c, double* mean, double* covariance) {
+inline void initial_state(const Sides& box, const Edges& edges, double rho2, double scene_rho2,
+                          const std::array<double, 4>& more, const ModelConstants& c, double* mean,
+                          double* covariance) {
     std::fill(mean, mean + kMean, 0.0);
     std::fill(covariance, covariance + kCovariance, 0.0);
     const double size[] = {box.width(), box.height()}, both = std::sqrt(size[0] * size[1]);
@@ -126,8 +127,13 @@ inline void initial_state(const Sides& box, const Edges& edges, double rho2, dou
         mean[axis * kStates + kPosition] = centre[axis];
         mean[axis * kStates + kLogSize] = log_of(size[axis]);
         const LastingError error(size[axis], both, scene_rho2, c);
-        const double variance[] = {(Rl + Rr) / 4.0, square(c.velocity_std * both), square(c.acceleration_std * both),
-                                   (Rl + Rr) / square(size[axis]), square(c.growth_std), error.position, error.size};
+        const double variance[] = {(Rl + Rr) / 4.0,
+                                   square(c.velocity_std * both),
+                                   square(c.acceleration_std * both),
+                                   (Rl + Rr) / square(size[axis]),
+                                   square(c.growth_std),
+                                   error.position,
+                                   error.size};
         double* const P = covariance + axis * kMatrix;
         for (int i = 0; i < kStates; ++i) P[i * kStates + i] = variance[i];
         P[kPosition * kStates + kLogSize] = P[kLogSize * kStates + kPosition] = (Rr - Rl) / (2.0 * size[axis]);

@@ -22,7 +22,10 @@ inline BySide spread_squares(const double* box_std, double width, double height,
     for (int axis = 0; axis < 2; ++axis)
         for (int side = 0; side < 2; ++side) {
             const double std = box_std[2 * side + axis];
-            out[2 * axis + side] = std::isnan(std) ? std : square(clamp(std / side_scale(size[axis], both), c.spread_bounds.low, c.spread_bounds.high));
+            out[2 * axis + side] =
+                std::isnan(std)
+                    ? std
+                    : square(clamp(std / side_scale(size[axis], both), c.spread_bounds.low, c.spread_bounds.high));
         }
     return out;
 }
@@ -40,7 +43,8 @@ struct SpreadNoise {
         const double own_both = std::sqrt(own[0] * own[1]), both = std::sqrt(size[0] * size[1]);
         BySide out;
         for (int axis = 0; axis < 2; ++axis) {
-            const double of_box = gain * square(side_scale(own[axis], own_both)), of_sensor = rho2 * square(side_scale(size[axis], both));
+            const double of_box = gain * square(side_scale(own[axis], own_both)),
+                         of_sensor = rho2 * square(side_scale(size[axis], both));
             for (int side = 2 * axis; side < 2 * axis + 2; ++side)
                 out[side] = std::isnan(squares[side]) ? 0.0 : of_box * squares[side] - of_sensor;
         }

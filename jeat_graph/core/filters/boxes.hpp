@@ -44,7 +44,8 @@ inline Sides corners(const double* mean) {
 
 // The box that a detector is expected to give: with the error that lasts.
 inline Sides expected_corners(const double* mean, double w, double h) {
-    const double x = mean[kPosition] + mean[kPositionError], y = mean[kStates + kPosition] + mean[kStates + kPositionError];
+    const double x = mean[kPosition] + mean[kPositionError],
+                 y = mean[kStates + kPosition] + mean[kStates + kPositionError];
     return {x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0};
 }
 
@@ -103,7 +104,8 @@ private:
         for (const Entry& entry : entries_) {
             const double width = entry.box.width();
             const int exponent = width > 0.0 ? std::ilogb(width) : std::numeric_limits<int>::min();
-            auto at = std::find_if(classes_.begin(), classes_.end(), [&](const Class& one) { return one.exponent == exponent; });
+            auto at = std::find_if(classes_.begin(), classes_.end(),
+                                   [&](const Class& one) { return one.exponent == exponent; });
             if (at == classes_.end()) at = classes_.insert(at, Class{exponent});
             at->widest = std::max(at->widest, width);
             at->entries.push_back(entry);

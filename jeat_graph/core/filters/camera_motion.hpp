@@ -12,7 +12,7 @@ namespace jeat::filters {
 
 struct CameraVariance {
     double shift, scale;
-    std::array<double, 3> last{};             // the last motion, per second
+    std::array<double, 3> last{};  // the last motion, per second
 };
 
 struct CameraMotion {
@@ -37,15 +37,9 @@ namespace detail {
 inline std::array<double, 9> inverse3(const std::array<double, 9>& a) {
     const double c0 = a[4] * a[8] - a[5] * a[7], c1 = a[5] * a[6] - a[3] * a[8], c2 = a[3] * a[7] - a[4] * a[6];
     const double det = a[0] * c0 + a[1] * c1 + a[2] * c2;
-    return {c0 / det,
-            (a[2] * a[7] - a[1] * a[8]) / det,
-            (a[1] * a[5] - a[2] * a[4]) / det,
-            c1 / det,
-            (a[0] * a[8] - a[2] * a[6]) / det,
-            (a[2] * a[3] - a[0] * a[5]) / det,
-            c2 / det,
-            (a[1] * a[6] - a[0] * a[7]) / det,
-            (a[0] * a[4] - a[1] * a[3]) / det};
+    return {c0 / det, (a[2] * a[7] - a[1] * a[8]) / det, (a[1] * a[5] - a[2] * a[4]) / det,
+            c1 / det, (a[0] * a[8] - a[2] * a[6]) / det, (a[2] * a[3] - a[0] * a[5]) / det,
+            c2 / det, (a[1] * a[6] - a[0] * a[7]) / det, (a[0] * a[4] - a[1] * a[3]) / det};
 }
 
 inline double median(std::vector<double> values) {
@@ -59,8 +53,9 @@ inline double median(std::vector<double> values) {
 // Tracks and boxes that are each other's nearest, where the camera moved as expected; (track, box) in order of tracks.
 inline std::vector<std::pair<std::size_t, std::size_t>> nearest_pairs(const std::vector<CameraTrack>& tracks,
                                                                       const std::vector<Sides>& boxes,
-                                                                      const ByLeft& index, const std::array<double, 3>& moved,
-                                                                      double width, double height, double variance) {
+                                                                      const ByLeft& index,
+                                                                      const std::array<double, 3>& moved, double width,
+                                                                      double height, double variance) {
     const std::size_t none = boxes.size();
     std::vector<std::size_t> box_of(tracks.size(), none), track_of(boxes.size(), tracks.size());
     std::vector<double> best_track(tracks.size(), kPairingGate), best_box(boxes.size(), kPairingGate);
@@ -99,7 +94,8 @@ inline bool contradicted(const std::vector<CameraTrack>& tracks, const std::vect
 }
 
 inline CameraMotion estimate_camera(const std::vector<CameraTrack>& tracks, const std::vector<Sides>& boxes,
-                                    const ByLeft& index, double width, double height, double dt, CameraVariance& prior, const ModelConstants& c) {
+                                    const ByLeft& index, double width, double height, double dt, CameraVariance& prior,
+                                    const ModelConstants& c) {
     CameraMotion out;
     if (tracks.size() < kLeastTracks || boxes.empty()) return out;
     const double variance = std::min(prior.shift * kPairingDeviations, kPairingMost);
@@ -116,8 +112,8 @@ inline CameraMotion estimate_camera(const std::vector<CameraTrack>& tracks, cons
     for (const auto& [i, j] : pairs) {
         const CameraTrack& t = tracks[i];
         const Sides& b = boxes[j];
-        rows.push_back({(b.left + b.right) / 2.0 - t.x, (b.top + b.bottom) / 2.0 - t.y, t.Sx, t.Sy,
-                        t.x - width / 2.0, t.y - height / 2.0});
+        rows.push_back({(b.left + b.right) / 2.0 - t.x, (b.top + b.bottom) / 2.0 - t.y, t.Sx, t.Sy, t.x - width / 2.0,
+                        t.y - height / 2.0});
         scales.push_back(t.scale);
     }
     const double typical = detail::median(scales);
@@ -146,7 +142,8 @@ inline CameraMotion estimate_camera(const std::vector<CameraTrack>& tracks, cons
         }
         covariance = detail::inverse3(information);
         for (int a = 0; a < 3; ++a)
-            out.theta[a] = covariance[a * 3] * right[0] + covariance[a * 3 + 1] * right[1] + covariance[a * 3 + 2] * right[2];
+            out.theta[a] =
+                covariance[a * 3] * right[0] + covariance[a * 3 + 1] * right[1] + covariance[a * 3 + 2] * right[2];
     }
     out.known = true;
     out.variance = {covariance[0], covariance[4]};

@@ -20,7 +20,8 @@ struct CameraPath {
         }
     }
     void follow(const CameraVelocity& before, const CameraVelocity& now, double width, double height, double step_s) {
-        const auto from = before.rate.displacement(width / 2.0, height / 2.0), to = now.rate.displacement(width / 2.0, height / 2.0);
+        const auto from = before.rate.displacement(width / 2.0, height / 2.0),
+                   to = now.rate.displacement(width / 2.0, height / 2.0);
         for (int axis = 0; axis < 2; ++axis) moved[axis] += (to[axis] - from[axis]) * (now.picture_s - step_s);
     }
     void follow(const CameraMotion& motion, double lasting) {

@@ -24,7 +24,8 @@ struct ScanClock {
 
 struct Evidence {
     std::size_t sensors = 0;
-    std::vector<double> hits, misses, stationary_hits, stationary_misses, recent, recent_weight, peak, total, total_weight;
+    std::vector<double> hits, misses, stationary_hits, stationary_misses, recent, recent_weight, peak, total,
+        total_weight;
     std::vector<std::uint8_t> found;
     std::vector<double> overlap, gained, detections;
     std::vector<std::int64_t> owner;
@@ -55,8 +56,8 @@ struct Evidence {
 
     void widen() {
         const std::size_t rows = size();
-        for (auto* column : {&hits, &misses, &stationary_hits, &stationary_misses, &recent, &recent_weight, &peak, &total,
-                             &total_weight})
+        for (auto* column : {&hits, &misses, &stationary_hits, &stationary_misses, &recent, &recent_weight, &peak,
+                             &total, &total_weight})
             widen_rows(*column, rows, sensors, 1);
         widen_rows(found, rows, sensors, 1);
         ++sensors;

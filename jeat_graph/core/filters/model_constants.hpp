@@ -27,10 +27,10 @@ struct ModelConstants {
 inline ModelConstants constants_of(const nanobind::handle& source) {
     ModelConstants c;
 #define JEAT_ONE(name) c.name = nanobind::cast<double>(source.attr(#name));
-#define JEAT_PAIR(name)                                                              \
-    {                                                                                \
+#define JEAT_PAIR(name)                                                                  \
+    {                                                                                    \
         const auto pair = nanobind::cast<std::pair<double, double>>(source.attr(#name)); \
-        c.name = {pair.first, pair.second};                                          \
+        c.name = {pair.first, pair.second};                                              \
     }
     JEAT_MODEL_CONSTANTS
 #undef JEAT_ONE

@@ -12,8 +12,8 @@
 namespace jeat::filters {
 
 struct SensorBelief {
-    std::vector<double> p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share,
-        score_weight;
+    std::vector<double> p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std,
+        agreed_share, score_weight;
     double noise_share;
 
     void widen(const ModelConstants& c) {
@@ -77,8 +77,8 @@ public:
             const double birth = began ? log_chance_ - log_p_detect_[s] : 0.0;
             if (hs + ms > 0.0) {
                 const double moved = h - hs <= 0.0 && m - ms <= 0.0 ? birth : 0.0;
-                const double blind = log_stationary_[s] + moved + log_beta(a_[s] + h - hs, b_[s] + m - ms) - log_beta_[s] +
-                                     hs * log_chance_ + ms * log_no_chance_;
+                const double blind = log_stationary_[s] + moved + log_beta(a_[s] + h - hs, b_[s] + m - ms) -
+                                     log_beta_[s] + hs * log_chance_ + ms * log_no_chance_;
                 sees = log_add(blind, log_not_stationary_[s] + seen_[s]);
                 out_.stationary_unseen[s] = exp_of(blind - sees);
             }
@@ -95,7 +95,8 @@ public:
             priors += prior;
             others += shared_[s];
         }
-        const double doubt = 1.0 / (1.0 + exp_of(clamp(best_score - c_.duplicate_log_odds, -kMostLogOdds, kMostLogOdds)));
+        const double doubt =
+            1.0 / (1.0 + exp_of(clamp(best_score - c_.duplicate_log_odds, -kMostLogOdds, kMostLogOdds)));
         real += c_.duplicate_weight * doubt * log_of(std::max(1.0 - e.overlap[row], kLeastApart));
         double false_object = -std::numeric_limits<double>::infinity();
         for (std::size_t s = 0; s < S; ++s)
@@ -137,10 +138,10 @@ private:
         return given * (1.0 - sensors_.agreed_share[s] * (1.0 - exp_of(-0.5 * below * below)) * alone * silent);
     }
 
-
     const SensorBelief& sensors_;
     const ModelConstants& c_;
-    std::vector<double> a_, b_, log_p_detect_, log_beta_, log_unseen_, log_not_unseen_, log_stationary_, log_not_stationary_;
+    std::vector<double> a_, b_, log_p_detect_, log_beta_, log_unseen_, log_not_unseen_, log_stationary_,
+        log_not_stationary_;
     std::vector<double> seen_, shared_, scores_;
     double log_chance_, log_no_chance_, log_shared_, log_not_shared_, noise_odds_;
     Posterior out_;
@@ -216,7 +217,8 @@ inline double beta_share(double hits, double of, double prior, double count) {
     return (hits + count * prior) / (of + count);
 }
 
-inline void learn_sensors(const Evidence& ended, const Evidence& living, SensorBelief& sensors, const ModelConstants& c) {
+inline void learn_sensors(const Evidence& ended, const Evidence& living, SensorBelief& sensors,
+                          const ModelConstants& c) {
     if (ended.size() + living.size() == 0) return;
     for (int round = 0; round < kRounds; ++round) {
         PosteriorRule rule(sensors, c);

@@ -76,7 +76,8 @@ inline void follow(double* mean, double* covariance, const CameraChange& change,
     const double share = square(elapsed / motion.span_s);
     const double x2 = square(mean[kPosition] - motion.moved.centre[0]);
     const double y2 = square(mean[kStates + kPosition] - motion.moved.centre[1]);
-    const double apart[] = {motion.variance[2] * x2 + motion.variance[3] * y2, motion.variance[2] * y2 + motion.variance[3] * x2};
+    const double apart[] = {motion.variance[2] * x2 + motion.variance[3] * y2,
+                            motion.variance[2] * y2 + motion.variance[3] * x2};
     for (int axis = 0; axis < 2; ++axis) {
         double *const m = mean + axis * kStates, *const P = covariance + axis * kMatrix;
         m[kPosition] += change.rate[axis] * elapsed;

@@ -88,8 +88,9 @@ struct RepeatCounts {
         const double top = (best_repeated + kBestCount * c.repeat_share) / (best + kBestCount);
         for (int g = kScoreBins - 1; g >= 0; --g) {
             const double trusted = boxes[g] * std::min(1.0, square(top / c.repeat_trusted));
-            const double share = (trusted * repeated[g] / (boxes[g] * top + kLeastBoxes) + c.repeat_count * c.repeat_share) /
-                                 (trusted + c.repeat_count);
+            const double share =
+                (trusted * repeated[g] / (boxes[g] * top + kLeastBoxes) + c.repeat_count * c.repeat_share) /
+                (trusted + c.repeat_count);
             if (share < 0.5) return kFirstLogit + g * kLogitStep;
         }
         return kFirstLogit;

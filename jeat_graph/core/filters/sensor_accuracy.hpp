@@ -68,7 +68,8 @@ struct AccuracySums {
             double sum = 0.0, number = 0.0;
             for (std::size_t j = 0; j < S; ++j) {
                 const double held = c.error_share * (exp_of(log_side_variance[i]) + exp_of(log_side_variance[j]));
-                const double beyond = std::max(both[i * S + j] - held, 0.0), rest = std::max(both[i * S + j] - known[j], 0.0);
+                const double beyond = std::max(both[i * S + j] - held, 0.0),
+                             rest = std::max(both[i * S + j] - known[j], 0.0);
                 sum += pairs[i * S + j] * (std::isnan(given[j]) ? beyond * share(p_detect[i], p_detect[j]) : rest);
                 number += pairs[i * S + j];
             }

@@ -47,9 +47,10 @@ JEAT_GRAPH_PART void predict_covariances(double* P, const Matrix& F, const Matri
 
 }  // namespace
 
-JEAT_GRAPH_WIDE JEAT_GRAPH_WHOLE void predict(double* mean, double* covariance, const Discretised& step, double dt, const Densities& q,
-                    const ModelConstants& c) {
-    const double growth_of_step = step_growth(mean_growth(mean), dt, c), width = mean[kLogSize], height = mean[kStates + kLogSize];
+JEAT_GRAPH_WIDE JEAT_GRAPH_WHOLE void predict(double* mean, double* covariance, const Discretised& step, double dt,
+                                              const Densities& q, const ModelConstants& c) {
+    const double growth_of_step = step_growth(mean_growth(mean), dt, c), width = mean[kLogSize],
+                 height = mean[kStates + kLogSize];
     Four e{2.0 * growth_of_step, 0.5 * (width + height), width, height};
     take_exp(e);
     const Matrix F = in_perspective(step.F, growth_of_step, e[0]);

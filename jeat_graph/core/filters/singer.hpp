@@ -30,7 +30,8 @@ struct Discretised {
 
 namespace detail {
 
-template <int N> std::array<double, N * N> product(const std::array<double, N * N>& a, const std::array<double, N * N>& b) {
+template <int N>
+std::array<double, N * N> product(const std::array<double, N * N>& a, const std::array<double, N * N>& b) {
     std::array<double, N * N> out{};
     for (int i = 0; i < N; ++i)
         for (int k = 0; k < N; ++k)
@@ -164,9 +165,9 @@ struct Densities {
 };
 
 // Columns of F that are not zero in each row: a state follows from itself and those that drive it.
-inline constexpr int kDriven[kStates][2] = {{kPosition, kAcceleration}, {kVelocity, kAcceleration}, {kAcceleration, kAcceleration},
-                                            {kLogSize, kGrowth}, {kGrowth, kGrowth}, {kPositionError, kPositionError},
-                                            {kSizeError, kSizeError}};
+inline constexpr int kDriven[kStates][2] = {
+    {kPosition, kAcceleration}, {kVelocity, kAcceleration},       {kAcceleration, kAcceleration}, {kLogSize, kGrowth},
+    {kGrowth, kGrowth},         {kPositionError, kPositionError}, {kSizeError, kSizeError}};
 
 // Rows of matrices are this long where loops over them are to become vectors.
 inline constexpr int kRow = kStates + 1;
@@ -177,7 +178,7 @@ void predict(double* mean, double* covariance, const Discretised& step, double d
 
 // What tables tell of a track and its variances, `kMotion` for each axis: reported_motion and the diagonal of reported_covariance.
 inline void report_motion(const double* mean, const double* covariance, const ModelConstants& c, double* reported,
-                        double* variance) {
+                          double* variance) {
     const double g = 0.5 * (mean[kGrowth] + mean[kStates + kGrowth]);
     const double by_velocity = 2.0 * g - 1.0 / c.velocity_time_s;
     for (int axis = 0; axis < 2; ++axis, reported += kMotion, variance += kMotion) {

@@ -215,7 +215,8 @@ private:
         for (int k = 0; k < FIRST_PASSES; ++k) {
             const auto at = state.mean;
             state = prior;
-            if (!update_about(at, {0.0, 1.0}, state, box, std::numeric_limits<double>::infinity(), camera_)) return false;
+            if (!update_about(at, {0.0, 1.0}, state, box, std::numeric_limits<double>::infinity(), camera_))
+                return false;
         }
         return true;
     }

@@ -55,9 +55,10 @@ inline void step(double dt, std::span<const double> jerk, std::span<const double
             at[1] += dt * at[2];
         }
         const double q = jerk[a] * jerk[a];
-        const std::array<std::array<double, AXIS>, AXIS> noise{{{q * dt3 * dt2 / 20.0, q * dt2 * dt2 / 8.0, q * dt3 / 6.0},
-                                                               {q * dt2 * dt2 / 8.0, q * dt3 / 3.0, q * half},
-                                                               {q * dt3 / 6.0, q * half, q * dt}}};
+        const std::array<std::array<double, AXIS>, AXIS> noise{
+            {{q * dt3 * dt2 / 20.0, q * dt2 * dt2 / 8.0, q * dt3 / 6.0},
+             {q * dt2 * dt2 / 8.0, q * dt3 / 3.0, q * half},
+             {q * dt3 / 6.0, q * half, q * dt}}};
         for (std::size_t r = 0; r < AXIS; ++r)
             for (std::size_t c = 0; c < AXIS; ++c) P[p + r][p + c] += noise[r][c];
     }
@@ -103,8 +104,8 @@ inline void solve_lower(Matrix& L, Matrix& A) {
 // Where the rows of one pair of states go: rows of 2 n + 4, of which each is on the first state, the second, the size,
 // and has a right-hand side.
 struct Pair {
-    double start, end;             // times of the states (s)
-    std::size_t first, last;       // boxes from the first, not with the last
+    double start, end;        // times of the states (s)
+    std::size_t first, last;  // boxes from the first, not with the last
     View2<double> out;
 };
 

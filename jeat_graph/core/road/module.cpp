@@ -42,8 +42,10 @@ Motion motion_of(const nb::handle& config) {
 Belief belief_of(const nb::handle& config, In1D size, In2D size_cov, In3<double> extremes) {
     check(size.size() == 3 && size_cov.shape(0) == 3 && size_cov.shape(1) == 3, "size (3,), its covariance (3, 3)");
     const auto take = [&](const char* name) { return nb::cast<double>(config.attr(name)); };
-    Belief out{motion_of(config), take("speed_std"), take("strip_std"), take("edge_px"), take("gate"), take("pause"),
-               take("most_beyond"), three(size.data()), {}, extremes_of(extremes)};
+    Belief out{motion_of(config),    take("speed_std"),  take("strip_std"),
+               take("edge_px"),      take("gate"),       take("pause"),
+               take("most_beyond"),  three(size.data()), {},
+               extremes_of(extremes)};
     for (std::size_t i = 0; i < 3; ++i) out.size_cov[i] = three(size_cov.data() + 3 * i);
     return out;
 }
@@ -154,7 +156,8 @@ bool linearise_boxes(const Camera& camera, In2D place, In2D way, In1D size, In2D
     check_rows({}, {z.shape(1), slopes.shape(1), residual.shape(1)}, CHANNELS);
     check(slopes.shape(2) == UNKNOWNS && size.size() == 3, "slopes (N, 4, 5) and a size (3,)");
     const nb::gil_scoped_release release;
-    return linearise(camera, view2(place), view2(way), size.data(), view2(z), view2(mode), span(slopes), view2(residual));
+    return linearise(camera, view2(place), view2(way), size.data(), view2(z), view2(mode), span(slopes),
+                     view2(residual));
 }
 
 Boxes boxes_of(In1D t, In2D white, In2D coloured, In2<std::int64_t> mode, In<std::int64_t> group, In1D memory_s,
@@ -192,7 +195,9 @@ void fill_chain_rows(In1D keys, In<std::int64_t> bounds, In1D t, In2D white, In2
     }
     const nb::gil_scoped_release release;
     for (std::size_t s = 0; s < pairs; ++s) {
-        const Pair pair{keys.data()[s], keys.data()[s + 1], static_cast<std::size_t>(bounds.data()[s]),
+        const Pair pair{keys.data()[s],
+                        keys.data()[s + 1],
+                        static_cast<std::size_t>(bounds.data()[s]),
                         static_cast<std::size_t>(bounds.data()[s + 1]),
                         {out.data() + s * out.shape(1) * out.shape(2), out.shape(1), out.shape(2)}};
         const auto [count, log_determinant] = pair_rows(pair, boxes, slopes.data(), view2(right), span(jerk));
@@ -206,53 +211,64 @@ void fill_chain_rows(In1D keys, In<std::int64_t> bounds, In1D t, In2D white, In2
 void bind(nb::module_& module) {
     const auto whole = [](const char* name) { return nb::arg(name).noconvert(); };
     nb::class_<Camera>(module, "Camera", "A camera over a flat road; see jeat_graph.road.camera.")
-        .def("__init__", [](Camera* self, In2D rotation, In1D position, Two focal, Two centre, Two picture,
-                            Two distortion) {
-                 new (self) Camera(camera_of(rotation, position, focal, centre, picture, distortion));
-             },
-             whole("rotation"), whole("position"), nb::arg("focal"), nb::arg("centre"), nb::arg("picture"),
-             nb::arg("distortion"),
-             "rotation: road to camera (3, 3); position (3,) in m; focal: fx, fy; centre: cx, cy; picture: width and\n"
-             "height (px); distortion: k1, k2.");
+        .def(
+            "__init__",
+            [](Camera* self, In2D rotation, In1D position, Two focal, Two centre, Two picture, Two distortion) {
+                new (self) Camera(camera_of(rotation, position, focal, centre, picture, distortion));
+            },
+            whole("rotation"), whole("position"), nb::arg("focal"), nb::arg("centre"), nb::arg("picture"),
+            nb::arg("distortion"),
+            "rotation: road to camera (3, 3); position (3,) in m; focal: fx, fy; centre: cx, cy; picture: width and\n"
+            "height (px); distortion: k1, k2.");
     nb::class_<Shared>(module, "Filter", "All tracks on the road; see jeat_graph.road.causal.")
-        .def("__init__", [](Shared* self, const Camera& camera, const nb::object& config, In1D size, In2D size_cov,
-                            In3<double> extremes, In2D errors) {
-                 new (self) Shared{filter_of(camera, config, size, size_cov, extremes, errors), {}};
-             },
-             nb::arg("camera"), nb::arg("config"), whole("size"), whole("size_cov"), whole("extremes"), whole("errors"),
-             "config: a RoadFilterConfig; size (3,), size_cov (3, 3): of a vehicle not seen yet; extremes: of the fleet;\n"
-             "errors (S, 2): correlation time of each sensor's errors (s), share of its sizes' variance that persists.")
-        .def("take", take, nb::arg("t"), whole("track_ids"), whole("sensors"), whole("z"), whole("r"),
-             whole("coloured_std"), whole("log_size"), whole("size_var"),
-             "Take in what tracks were given at time t (s): centres z (M, 2) with variances r of their new and standard\n"
-             "deviations of their persisting errors (px), log_size (M, 2) with variances.")
-        .def("read", read, nb::arg("t"), whole("track_ids"),
-             "States at time t (s) of those of the tracks (N,) that stand on the road and are vehicles: identities (K,),\n"
-             "means (K, 8) and variances (K, 8) as road_terms has them.")
-        .def("forget", [](Shared& shared, double t, double silence_s) {
-                 const Exclusive::Hold hold(shared.use);
-                 shared.filter.forget(t, silence_s);
-             },
-             nb::arg("t"), nb::arg("silence_s"),
-             "Remove tracks without a box for longer than silence_s.");
-    module.def("predict", [](Out<double> mean, Out2<double> cov, double dt, const nb::object& config) {
-                   Borrowed borrowed(mean, cov);
-                   predict(borrowed.state, dt, motion_of(config));
-               },
-               whole("mean"), whole("cov"), nb::arg("dt"), nb::arg("config"),
-               "Predict a state (8,) and its covariance (8, 8) by dt (s) in place; config: a RoadFilterConfig.");
-    module.def("update", update_by, whole("mean"), whole("cov"), whole("z"), whole("R"), whole("mode"), nb::arg("gate"),
-               nb::arg("camera"),
-               "Take a box into a state in place: channels z (4,) with variances R (4,), mode (2,). False, with the state as\n"
-               "it was, where the vehicle is not in front of the camera.");
-    module.def("road_terms", terms_of, whole("means"), whole("covs"),
-               "States (N, 8) with covariances (N, 8, 8) as tables of the road have them: x, y (m), speed (m/s), heading\n"
-               "from y towards x (rad), acceleration along the way (m/s²), length, width, height (m), and variances (N, 8).");
-    module.def("beyond_vehicles", [](In1D size, In1D variance, In3<double> extremes) {
-                   check(size.size() == 3 && variance.size() == 3, "a size is length, width and height");
-                   return beyond_vehicles(size.data(), variance.data(), extremes_of(extremes));
-               },
-               whole("size"), whole("variance"), whole("extremes"), "See jeat_graph.road.fleet.");
+        .def(
+            "__init__",
+            [](Shared* self, const Camera& camera, const nb::object& config, In1D size, In2D size_cov,
+               In3<double> extremes,
+               In2D errors) { new (self) Shared{filter_of(camera, config, size, size_cov, extremes, errors), {}}; },
+            nb::arg("camera"), nb::arg("config"), whole("size"), whole("size_cov"), whole("extremes"), whole("errors"),
+            "config: a RoadFilterConfig; size (3,), size_cov (3, 3): of a vehicle not seen yet; extremes: of the fleet;\n"
+            "errors (S, 2): correlation time of each sensor's errors (s), share of its sizes' variance that persists.")
+        .def(
+            "take", take, nb::arg("t"), whole("track_ids"), whole("sensors"), whole("z"), whole("r"),
+            whole("coloured_std"), whole("log_size"), whole("size_var"),
+            "Take in what tracks were given at time t (s): centres z (M, 2) with variances r of their new and standard\n"
+            "deviations of their persisting errors (px), log_size (M, 2) with variances.")
+        .def(
+            "read", read, nb::arg("t"), whole("track_ids"),
+            "States at time t (s) of those of the tracks (N,) that stand on the road and are vehicles: identities (K,),\n"
+            "means (K, 8) and variances (K, 8) as road_terms has them.")
+        .def(
+            "forget",
+            [](Shared& shared, double t, double silence_s) {
+                const Exclusive::Hold hold(shared.use);
+                shared.filter.forget(t, silence_s);
+            },
+            nb::arg("t"), nb::arg("silence_s"), "Remove tracks without a box for longer than silence_s.");
+    module.def(
+        "predict",
+        [](Out<double> mean, Out2<double> cov, double dt, const nb::object& config) {
+            Borrowed borrowed(mean, cov);
+            predict(borrowed.state, dt, motion_of(config));
+        },
+        whole("mean"), whole("cov"), nb::arg("dt"), nb::arg("config"),
+        "Predict a state (8,) and its covariance (8, 8) by dt (s) in place; config: a RoadFilterConfig.");
+    module.def(
+        "update", update_by, whole("mean"), whole("cov"), whole("z"), whole("R"), whole("mode"), nb::arg("gate"),
+        nb::arg("camera"),
+        "Take a box into a state in place: channels z (4,) with variances R (4,), mode (2,). False, with the state as\n"
+        "it was, where the vehicle is not in front of the camera.");
+    module.def(
+        "road_terms", terms_of, whole("means"), whole("covs"),
+        "States (N, 8) with covariances (N, 8, 8) as tables of the road have them: x, y (m), speed (m/s), heading\n"
+        "from y towards x (rad), acceleration along the way (m/s²), length, width, height (m), and variances (N, 8).");
+    module.def(
+        "beyond_vehicles",
+        [](In1D size, In1D variance, In3<double> extremes) {
+            check(size.size() == 3 && variance.size() == 3, "a size is length, width and height");
+            return beyond_vehicles(size.data(), variance.data(), extremes_of(extremes));
+        },
+        whole("size"), whole("variance"), whole("extremes"), "See jeat_graph.road.fleet.");
     module.def("linearise", linearise_boxes, nb::arg("camera"), whole("place"), whole("way"), whole("size"), whole("z"),
                whole("mode"), whole("slopes"), whole("residual"), "See jeat_graph.road.box_channels.");
     module.def("whiten", whiten_columns, whole("columns"), whole("t"), whole("white"), whole("coloured"), whole("mode"),

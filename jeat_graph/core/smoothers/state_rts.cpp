@@ -49,7 +49,7 @@ JEAT_GRAPH_PART void factorise(const double* predicted_covariances, ScaledFactor
 
 // G' = P-^-1 F P of one axis, all of its columns at once.
 JEAT_GRAPH_PART void smoother_gain(const ScaledFactors& predicted, int axis, const Matrix& F, const double* P,
-                          double (&Gt)[kStates][kRow]) {
+                                   double (&Gt)[kStates][kRow]) {
     const double* const scale = predicted.scale[axis];
     const auto& L = predicted.L;
     for (int i = 0; i < kStates; ++i) {
@@ -70,8 +70,9 @@ JEAT_GRAPH_PART void smoother_gain(const ScaledFactors& predicted, int axis, con
 }
 
 // m <- m + G (m+ - m-), P <- P + G (P+ - P-) G' of one axis, of whose upper triangle alone.
-JEAT_GRAPH_PART void smooth_axis(double* mean, double* P, const double (&Gt)[kStates][kRow], const double* predicted_mean,
-                        const double* predicted, const double* next_mean, const double* next) {
+JEAT_GRAPH_PART void smooth_axis(double* mean, double* P, const double (&Gt)[kStates][kRow],
+                                 const double* predicted_mean, const double* predicted, const double* next_mean,
+                                 const double* next) {
     double D[kStates][kRow] = {};
     for (int k = 0; k < kStates; ++k) {
         const double moved = next_mean[k] - predicted_mean[k];
@@ -91,7 +92,8 @@ JEAT_GRAPH_PART void smooth_axis(double* mean, double* P, const double (&Gt)[kSt
 }  // namespace
 
 JEAT_GRAPH_WIDE void rts(double* means, double* covariances, const Matrix& F, const double* predicted_means,
-                         const double* predicted_covariances, const double* next_means, const double* next_covariances) {
+                         const double* predicted_covariances, const double* next_means,
+                         const double* next_covariances) {
     ScaledFactors predicted;
     factorise(predicted_covariances, predicted);
     for (int axis = 0; axis < 2; ++axis) {

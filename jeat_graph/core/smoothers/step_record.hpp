@@ -35,8 +35,8 @@ inline void unfold(const Halves& halves, double* out) {
 
 // One update of one track.
 struct Entry {
-    double t, dt;       // time, and since the last update (s)
-    double real = 0.0;  // posterior after the step, where this was its last update
+    double t, dt;         // time, and since the last update (s)
+    double real = 0.0;    // posterior after the step, where this was its last update
     double later = -1.0;  // posterior by what comes later, where a detection was found and that is given
     std::int64_t used = 0;
     bool confirmed = false;  // by a detection of that time
@@ -49,7 +49,7 @@ struct Entry {
 // What the filter did in one step. It is kept apart until no step can come before this one any more.
 struct Record {
     double t = 0.0;
-    bool is_reset = false;            // all tracks had ended before the step
+    bool is_reset = false;               // all tracks had ended before the step
     std::vector<std::int64_t> track_id;  // of the tracks after it, before any of them ended
     std::vector<std::size_t> tracks;     // how many there were after each scan
     std::vector<std::size_t> known;      // of these, how many had been born before it

@@ -29,8 +29,8 @@ private:
     double weigh_scores(const State& state, const Scan& given);
     void weigh_boxes(const CorrectedBoxes& scan, const Scan& given, const ModelConstants& c,
                      std::vector<std::uint8_t>& confirms) const;
-    void find_candidates(const State& state, const CorrectedBoxes& scan, const Scan& given,
-                         double least_of_clutter, AssociatedPairs& out);
+    void find_candidates(const State& state, const CorrectedBoxes& scan, const Scan& given, double least_of_clutter,
+                         AssociatedPairs& out);
     double log_ratio(const TrackTerms& track, const CorrectedBoxes& scan, std::size_t box,
                      const association::ScanTerms& terms, const ModelConstants& c) const;
     void order_owners(const Scan& given);

@@ -40,8 +40,7 @@ void CameraFollower::follow_picture(State& state, std::size_t sensor, const Corr
     Tracks& tracks = state.tracks;
     changes_.clear();
     for (std::size_t i = 0; i < tracks.size(); ++i)
-        changes_.push_back(
-            camera_change(tracks.mean_of(i), tracks.evidence.last_s[i], *motion, camera, now, step_s));
+        changes_.push_back(camera_change(tracks.mean_of(i), tracks.evidence.last_s[i], *motion, camera, now, step_s));
     find_surely_there(state, sensor);
     moved_ = tracks_;
     for (std::size_t k = 0; k < moved_.size(); ++k) {

@@ -69,11 +69,10 @@ bool ends(const State& state, std::size_t row) {
     const Tracks& tracks = state.tracks;
     const ModelConstants& c = state.constants;
     const double gap = unseen_for(state, row), real = tracks.real[row];
-    return !tracks.awaited[row] &&
-           (gap > c.longest_gap_s || (real < c.report && gap > c.doubtful_gap_s) ||
-            (real < c.false_posterior && gap > c.false_gap_s) ||
-            1.0 - tracks.presence_of(row)[kGone] < c.least_presence ||
-            (gap > c.outside_gap_s && share_inside(state, row) < c.outside_share));
+    return !tracks.awaited[row] && (gap > c.longest_gap_s || (real < c.report && gap > c.doubtful_gap_s) ||
+                                    (real < c.false_posterior && gap > c.false_gap_s) ||
+                                    1.0 - tracks.presence_of(row)[kGone] < c.least_presence ||
+                                    (gap > c.outside_gap_s && share_inside(state, row) < c.outside_share));
 }
 
 // End the marked tracks: their evidence is kept.
@@ -105,7 +104,8 @@ void begin_tracks(State& state, const Scan& given, const CorrectedBoxes& scan, c
         may_be_interrupted();
         const double overlap = rivals.most(scan.boxes[j], given.logits[j], given.logits, free);
         const Sides& box = scan.boxes[j];
-        const BySide more = scan.spreads.empty() ? BySide{} : spread.more(scan.spreads[j], box, {box.width(), box.height()});
+        const BySide more =
+            scan.spreads.empty() ? BySide{} : spread.more(scan.spreads[j], box, {box.width(), box.height()});
         initial_state(box, scan.edges[j], rho2, scene_rho2, more, c, tracks.mean_of(row), tracks.covariance_of(row));
         with_velocity(tracks.mean_of(row), state.camera_velocity);
         tracks.track_id[row] = state.next_id++;
@@ -176,8 +176,7 @@ void judge(State& state) {
         tracks.log_odds[i] = belief.log_odds;
         const bool stationary = is_stationary(tracks.mean_of(i), state.constants);
         for (std::size_t k = 0; k < S; ++k)
-            tracks.sees[i * S + k] =
-                (1.0 - belief.unseen[k]) * (stationary ? 1.0 - belief.stationary_unseen[k] : 1.0);
+            tracks.sees[i * S + k] = (1.0 - belief.unseen[k]) * (stationary ? 1.0 - belief.stationary_unseen[k] : 1.0);
         tracks.real[i] = expit(tracks.log_odds[i]);
     }
 }

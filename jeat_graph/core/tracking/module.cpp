@@ -49,8 +49,8 @@ struct Moment {
     Answer answer;
 };
 
-using Scans = std::tuple<Out<std::int64_t>, Out<std::int64_t>, Out<std::int64_t>, Out2<double>, Out2<double>, Out2<double>, Out2<double>,
-                         Out2<double>>;
+using Scans = std::tuple<Out<std::int64_t>, Out<std::int64_t>, Out<std::int64_t>, Out2<double>, Out2<double>,
+                         Out2<double>, Out2<double>, Out2<double>>;
 
 Scans scans_of(const Record& record, const ModelConstants& c) {
     std::vector<double> transitions, predicted, predicted_covariance, mean, covariance;
@@ -72,12 +72,18 @@ Scans scans_of(const Record& record, const ModelConstants& c) {
     const std::vector<std::int64_t> sensors(record.sensors.begin(), record.sensors.end());
     const std::vector<std::int64_t> tracks(record.tracks.begin(), record.tracks.end());
     const std::vector<std::int64_t> known(record.known.begin(), record.known.end());
-    return {array_of(sensors), array_of(tracks), array_of(known), array_of(transitions, kMatrix), array_of(predicted, kMean),
-            array_of(predicted_covariance, kCovariance), array_of(mean, kMean), array_of(covariance, kCovariance)};
+    return {array_of(sensors),
+            array_of(tracks),
+            array_of(known),
+            array_of(transitions, kMatrix),
+            array_of(predicted, kMean),
+            array_of(predicted_covariance, kCovariance),
+            array_of(mean, kMean),
+            array_of(covariance, kCovariance)};
 }
 
-using Fields = std::tuple<double, bool, Out<double>, Out<std::int64_t>, Out<std::uint8_t>, Out<double>, Out<std::uint8_t>,
-                        Out<double>>;
+using Fields = std::tuple<double, bool, Out<double>, Out<std::int64_t>, Out<std::uint8_t>, Out<double>,
+                          Out<std::uint8_t>, Out<double>>;
 
 Fields fields_of(const Record& record) {
     std::vector<double> real, missed;
@@ -93,8 +99,8 @@ Fields fields_of(const Record& record) {
         real.push_back(entry.real), used.push_back(entry.used);
         confirmed.push_back(entry.confirmed), missed.push_back(entry.missed);
     }
-    return {record.t, record.is_reset, array_of(real), array_of(used), array_of(confirmed), array_of(missed),
-            array_of(record.kept), array_of(later)};
+    return {record.t,         record.is_reset,       array_of(real), array_of(used), array_of(confirmed),
+            array_of(missed), array_of(record.kept), array_of(later)};
 }
 
 // Gaps that outlasted each bin, and of these those that ended well.
@@ -142,7 +148,8 @@ public:
         if (similarity) check_lengths({similarity->shape(1), logits.size()});
         if (similarity) check(finite(span(*similarity)), "similarities are finite");
         if (owners) check_lengths({owners->shape(0), logits.size()});
-        if (owners) check(owners->shape(1) == 3, "owners are given with whether more of theirs are to come, and a posterior");
+        if (owners)
+            check(owners->shape(1) == 3, "owners are given with whether more of theirs are to come, and a posterior");
         if (owners) check(finite(span(*owners)), "owners are finite");
         if (box_std) check_lengths({box_std->shape(0), logits.size()});
         if (box_std) check(box_std->shape(1) == 4, "spreads have four numbers");
@@ -165,7 +172,9 @@ public:
             for (std::size_t j = at; j < at + number; ++j) {
                 const double* const box = boxes.data() + 4 * j;
                 scan.boxes.push_back({box[0], box[1], box[0] + box[2], box[1] + box[3]});
-                if (box_std) scan.spreads.push_back(filters::spread_squares(box_std->data() + 4 * j, box[2], box[3], state.constants));
+                if (box_std)
+                    scan.spreads.push_back(
+                        filters::spread_squares(box_std->data() + 4 * j, box[2], box[3], state.constants));
             }
             scan.logits.assign(logits.data() + at, logits.data() + at + number);
             scan.similarity = {nullptr, 0, 0};
@@ -347,8 +356,7 @@ public:
         out["log_side_variance"] = array_of(noise);
         out["lasting"] = array_of(state.accuracy.lasting);
         std::vector<double> gains;
-        for (std::size_t k = 0; k < state.sensors.size(); ++k)
-            gains.push_back(state.spread_noise(k).gain);
+        for (std::size_t k = 0; k < state.sensors.size(); ++k) gains.push_back(state.spread_noise(k).gain);
         out["log_own_variance"] = array_of(state.log_side_variance);
         out["spread_gain"] = array_of(gains);
         std::vector<double> offsets;
@@ -409,46 +417,57 @@ private:
 }  // namespace
 
 void bind(nb::module_& module) {
-    module.def("kept_boxes", [](In2<double> boxes, In<double> scores, const nb::object& constants) {
-                   check_lengths({boxes.shape(0), scores.size()});
-                   check(boxes.shape(1) == 4 && finite(span(boxes)) && finite(span(scores)), "boxes have four sides, and scores");
-                   const auto number = [&](const char* name) { return nb::cast<double>(constants.attr(name)); };
-                   const double on_one_spot = number("most_on_one_spot"), overlap = number("spot_overlap");
-                   const double touching = number("most_touching");
-                   const std::span<const Sides> sides(reinterpret_cast<const Sides*>(boxes.data()), boxes.shape(0));
-                   const auto kept = [&] {
-                       const nb::gil_scoped_release release;
-                       const HeedsSignals heeds;
-                       return association::kept_boxes(sides, span(scores), on_one_spot, overlap, touching);
-                   }();
-                   return array_of(kept);
-               },
-               nb::arg("boxes").noconvert(), nb::arg("scores").noconvert(), nb::arg("constants"),
-               "Places (K,) of the boxes (M, 4) left, top, right, bottom (px) with scores (M,) that count; see\n"
-               "jeat_graph.association.heaps.");
+    module.def(
+        "kept_boxes",
+        [](In2<double> boxes, In<double> scores, const nb::object& constants) {
+            check_lengths({boxes.shape(0), scores.size()});
+            check(boxes.shape(1) == 4 && finite(span(boxes)) && finite(span(scores)),
+                  "boxes have four sides, and scores");
+            const auto number = [&](const char* name) { return nb::cast<double>(constants.attr(name)); };
+            const double on_one_spot = number("most_on_one_spot"), overlap = number("spot_overlap");
+            const double touching = number("most_touching");
+            const std::span<const Sides> sides(reinterpret_cast<const Sides*>(boxes.data()), boxes.shape(0));
+            const auto kept = [&] {
+                const nb::gil_scoped_release release;
+                const HeedsSignals heeds;
+                return association::kept_boxes(sides, span(scores), on_one_spot, overlap, touching);
+            }();
+            return array_of(kept);
+        },
+        nb::arg("boxes").noconvert(), nb::arg("scores").noconvert(), nb::arg("constants"),
+        "Places (K,) of the boxes (M, 4) left, top, right, bottom (px) with scores (M,) that count; see\n"
+        "jeat_graph.association.heaps.");
     nb::class_<Record>(module, "Record", "What the filter did in a step, for the smoother.")
-        .def("track_ids", [](const Record& record) { return array_of(record.track_id); },
-             "Identities of the tracks after it, before any ended (N,).")
-        .def("__deepcopy__", [](const Record& record, const nb::object&) { return new Record(record); },
-             nb::arg("memo"), "The same once more.")
-        .def("scans", [](const Record& record, const Model& model) { return scans_of(record, model.constants()); },
-             nb::arg("model"),
-             "Scan by scan, in the order they were taken in: index of the sensor (K,), number of tracks after it (K,),\n"
-             "and of those among them that had been born before (K,); of these, one scan after the other, the transition (E, 49) from the record before, both axes in one, and mean\n"
-             "(E, 14) and covariance (E, 98) before the update, and after it.")
-        .def("fields", &fields_of,
-             "Time (s), whether all tracks had ended before; of the tracks (N,) their posterior, the sensors that found\n"
-             "them, whether one of these confirms that they are there, the detections missed since, and whether they live on.")
-        .def("gaps", [](const Record& record) { return gaps_of(record.gaps); },
-             "Gaps that outlasted each bin, and those that ended well (2, 9), before tracks ended.")
+        .def(
+            "track_ids", [](const Record& record) { return array_of(record.track_id); },
+            "Identities of the tracks after it, before any ended (N,).")
+        .def(
+            "__deepcopy__", [](const Record& record, const nb::object&) { return new Record(record); }, nb::arg("memo"),
+            "The same once more.")
+        .def(
+            "scans", [](const Record& record, const Model& model) { return scans_of(record, model.constants()); },
+            nb::arg("model"),
+            "Scan by scan, in the order they were taken in: index of the sensor (K,), number of tracks after it (K,),\n"
+            "and of those among them that had been born before (K,); of these, one scan after the other, the transition (E, 49) from the record before, both axes in one, and mean\n"
+            "(E, 14) and covariance (E, 98) before the update, and after it.")
+        .def(
+            "fields", &fields_of,
+            "Time (s), whether all tracks had ended before; of the tracks (N,) their posterior, the sensors that found\n"
+            "them, whether one of these confirms that they are there, the detections missed since, and whether they live on.")
+        .def(
+            "gaps", [](const Record& record) { return gaps_of(record.gaps); },
+            "Gaps that outlasted each bin, and those that ended well (2, 9), before tracks ended.")
         .def("gaps_after", [](const Record& record) { return gaps_of(record.gaps_after); }, "The same after it.");
     nb::class_<Moment>(module, "Moment", "All that the next step depends on; the smoother is no part of it.")
-        .def("__deepcopy__", [](const Moment& moment, const nb::object&) { return new Moment(moment); },
-             nb::arg("memo"), "The same once more.")
-        .def("identities", [](const Moment& moment) { return array_of(moment.state.tracks.track_id); },
-             "Identities of the living tracks (N,).")
-        .def("born", [](const Moment& moment) { return moment.state.next_id - 1; },
-             "Number of tracks started before it.");
+        .def(
+            "__deepcopy__", [](const Moment& moment, const nb::object&) { return new Moment(moment); }, nb::arg("memo"),
+            "The same once more.")
+        .def(
+            "identities", [](const Moment& moment) { return array_of(moment.state.tracks.track_id); },
+            "Identities of the living tracks (N,).")
+        .def(
+            "born", [](const Moment& moment) { return moment.state.next_id - 1; },
+            "Number of tracks started before it.");
     nb::class_<Rows>(module, "Rows", "The tracks that a step reports.")
         .def("columns", &table, "As Model.rows has them, also after later steps.");
     nb::class_<Model>(module, "Model", "The tracker's state and its step; see jeat_graph.tracking.reference.")
@@ -456,44 +475,50 @@ void bind(nb::module_& module) {
              nb::arg("height"), nb::arg("known"), nb::arg("lag_s"),
              "constants: a ModelConstants; width, height: of the picture (px), if known; lag_s: of the smoother (s),\n"
              "infinite for whole tracks, negative for none.")
-        .def("declare_sensor", exclusive(&Model::declare_sensor),
-             nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(), nb::arg("score_weight") = 1.0,
-             nb::arg("lasting") = std::numeric_limits<double>::quiet_NaN(),
-             "Add a sensor that has had no scan yet. even_logit: of the score at which a box is as likely real as not,\n"
-             "NaN where it is to be learnt; score_weight: of its scores as evidence; lasting: variance of what lasts of\n"
-             "its errors (sizes²), NaN where it is to be learnt.")
-        .def("take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(), nb::arg("numbers").noconvert(),
-             nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(), nb::arg("similarity").noconvert() = nb::none(),
-             nb::arg("motion").noconvert() = nb::none(), nb::arg("owners").noconvert() = nb::none(),
-             nb::arg("box_std").noconvert() = nb::none(),
-             "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
-             "top, width, height (px), logits of their scores (M,); similarity (N, M): how much more likely each box is of a\n"
-             "living track than of another by what both look like, as ln of the ratio; motion (11,): of the camera since\n"
-             "its picture before, see jeat_graph.filters.picture_motion.PictureMotion; owners (M, 3): whose each box is,\n"
-             "where that is given, below 0 for nobody's, at most one box of a scan each, and 1 where more of its owner's are\n"
-             "to come, and the posterior of an object there by what comes later, for the smoother, below 0 where it is not\n"
-             "known. A track of an owner takes no box but its own, and lives as long as it is awaited; box_std (M, 4): standard\n"
-             "deviations of left, top, right, bottom by the detector (px), NaN where unknown.")
+        .def(
+            "declare_sensor", exclusive(&Model::declare_sensor),
+            nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(), nb::arg("score_weight") = 1.0,
+            nb::arg("lasting") = std::numeric_limits<double>::quiet_NaN(),
+            "Add a sensor that has had no scan yet. even_logit: of the score at which a box is as likely real as not,\n"
+            "NaN where it is to be learnt; score_weight: of its scores as evidence; lasting: variance of what lasts of\n"
+            "its errors (sizes²), NaN where it is to be learnt.")
+        .def(
+            "take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(),
+            nb::arg("numbers").noconvert(), nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(),
+            nb::arg("similarity").noconvert() = nb::none(), nb::arg("motion").noconvert() = nb::none(),
+            nb::arg("owners").noconvert() = nb::none(), nb::arg("box_std").noconvert() = nb::none(),
+            "Take in the scans of one time t (s): sensors (K,), numbers of boxes of each (K,), all boxes (M, 4) left,\n"
+            "top, width, height (px), logits of their scores (M,); similarity (N, M): how much more likely each box is of a\n"
+            "living track than of another by what both look like, as ln of the ratio; motion (11,): of the camera since\n"
+            "its picture before, see jeat_graph.filters.picture_motion.PictureMotion; owners (M, 3): whose each box is,\n"
+            "where that is given, below 0 for nobody's, at most one box of a scan each, and 1 where more of its owner's are\n"
+            "to come, and the posterior of an object there by what comes later, for the smoother, below 0 where it is not\n"
+            "known. A track of an owner takes no box but its own, and lives as long as it is awaited; box_std (M, 4): standard\n"
+            "deviations of left, top, right, bottom by the detector (px), NaN where unknown.")
         .def("record", exclusive(&Model::record), "What the last step gave the smoother; once.")
-        .def("hand_over", exclusive(&Model::hand_over), nb::arg("record").none() = nb::none(),
-             nb::arg("given").noconvert() = nb::none(), nb::arg("label").noconvert() = nb::none(),
-             nb::arg("share").noconvert() = nb::none(),
-             "Tell the smoother of a step (of the last one without a record), in order of time: the identity given out\n"
-             "for each of its tracks (N,), the number of its class, below 0 for none, and the share of its votes.")
+        .def(
+            "hand_over", exclusive(&Model::hand_over), nb::arg("record").none() = nb::none(),
+            nb::arg("given").noconvert() = nb::none(), nb::arg("label").noconvert() = nb::none(),
+            nb::arg("share").noconvert() = nb::none(),
+            "Tell the smoother of a step (of the last one without a record), in order of time: the identity given out\n"
+            "for each of its tracks (N,), the number of its class, below 0 for none, and the share of its votes.")
         .def("forget", exclusive(&Model::forget), nb::arg("track_id").noconvert(), nb::arg("until").noconvert(),
              "Have no smoothed rows of tracks, by ascending identities (K,), up to a time (K,) each (s).")
         .def("reset", exclusive(&Model::reset), nb::arg("t"),
              "End all tracks and go on from another time (s), as if none had passed; what was learnt stays.")
         .def("snapshot", exclusive(&Model::snapshot), "A copy of all that the next step depends on.")
         .def("restore", exclusive(&Model::restore), nb::arg("moment"), "Go back to a snapshot of this model.")
-        .def("number_on_from", exclusive(&Model::number_on_from), nb::arg("identity"), "Give no new track a smaller identity.")
+        .def("number_on_from", exclusive(&Model::number_on_from), nb::arg("identity"),
+             "Give no new track a smaller identity.")
         .def("state", exclusive(&Model::state), nb::arg("moment").none() = nb::none(),
              "Everything as arrays by name, the smoother's too; that at a moment, if one is given.")
         .def("set_state", exclusive(&Model::set_state), nb::arg("state"),
              "Go on from what state() returned. ValueError: it is not what a model can be in; nothing is changed then.")
-        .def("rows", exclusive(&Model::rows), "Reported tracks: t, identity, mean (N, 10), variance (N, 10), posterior, sensors, class, its share.")
+        .def("rows", exclusive(&Model::rows),
+             "Reported tracks: t, identity, mean (N, 10), variance (N, 10), posterior, sensors, class, its share.")
         .def("reported", exclusive(&Model::reported), "What rows() returns, to be made columns when they are wanted.")
-        .def("states", exclusive(&Model::states), "Their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7.")
+        .def("states", exclusive(&Model::states),
+             "Their states: means (N, 14), and covariances (N, 98): two axes of 7 x 7.")
         .def("fit", exclusive(&Model::fit),
              "Of the boxes of the last step the squared distance of the centre (M,), NaN where it began a track, and\n"
              "the scale of the sensor's noise (M,); the posteriors (N,) of the tracks in living().")
@@ -501,14 +526,18 @@ void bind(nb::module_& module) {
         .def("sensors", exclusive(&Model::sensors), "Number of sensors.")
         .def("time", exclusive(&Model::time), "Time of the last step (s); None before the first.")
         .def("picture", exclusive(&Model::picture), "Width and height of the picture (px), as far as is known.")
-        .def("camera_moved", exclusive(&Model::camera_moved), "How far the camera's motion has taken a point at rest (2,) (px).")
+        .def("camera_moved", exclusive(&Model::camera_moved),
+             "How far the camera's motion has taken a point at rest (2,) (px).")
         .def("last_scans", exclusive(&Model::last_scans), "Time of each sensor's last scan (s), NaN before it.")
-        .def("__deepcopy__", [](Model& model, const nb::object&) {
-                 const Exclusive::Hold hold(model.use);
-                 return new Model(model);
-             },
-             nb::arg("memo"), "A model of its own in the same state.")
-        .def("assigned", exclusive(&Model::assigned), "Identity of the track that each box of the last step was assigned to (M,).")
+        .def(
+            "__deepcopy__",
+            [](Model& model, const nb::object&) {
+                const Exclusive::Hold hold(model.use);
+                return new Model(model);
+            },
+            nb::arg("memo"), "A model of its own in the same state.")
+        .def("assigned", exclusive(&Model::assigned),
+             "Identity of the track that each box of the last step was assigned to (M,).")
         .def("living", exclusive(&Model::living), "Identities of the tracks of the last step, before any ended (N,).")
         .def("size", exclusive(&Model::size), "Number of living tracks.")
         .def("born", exclusive(&Model::born), "Number of tracks started so far.")

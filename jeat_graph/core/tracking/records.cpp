@@ -15,8 +15,7 @@ void begin_entry(const State& state, std::size_t row, double dt, smoothers::Entr
 }  // namespace
 
 void record_growth(const State& state, Record& record) {
-    for (std::size_t i = 0; i < state.tracks.size(); ++i)
-        record.growth.push_back(mean_growth(state.tracks.mean_of(i)));
+    for (std::size_t i = 0; i < state.tracks.size(); ++i) record.growth.push_back(mean_growth(state.tracks.mean_of(i)));
 }
 
 void record_predictions(const State& state, std::size_t sensor, double dt, Record& record) {

@@ -23,11 +23,11 @@ using smoothers::Rows;
 
 // What the last step gave out.
 struct Answer {
-    Rows rows;                                 // of the tracks that are reported
-    std::vector<double> mean, covariance;      // states of these
+    Rows rows;                                   // of the tracks that are reported
+    std::vector<double> mean, covariance;        // states of these
     std::vector<std::int64_t> assigned, living;  // of all boxes; the tracks before any ended
-    std::vector<double> real;                  // posteriors of these
-    std::vector<double> nis, noise_scale;      // of all boxes
+    std::vector<double> real;                    // posteriors of these
+    std::vector<double> nis, noise_scale;        // of all boxes
 };
 
 // Numbers that may be infinite or none: what has never been.
@@ -137,7 +137,8 @@ template <class Visitor, class Table>
 void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_t rows) {
     table.columns([&](const char* name, auto& column, std::size_t width) {
         // Of times is known elsewhere what they may be; they are never multiplied.
-        v.column(prefix + name, column, rows, width, std::string_view(name).ends_with("_s") ? Values::any : Values::finite);
+        v.column(prefix + name, column, rows, width,
+                 std::string_view(name).ends_with("_s") ? Values::any : Values::finite);
     });
 }
 
@@ -166,8 +167,8 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
 }
 
 template <class Visitor> void visit_state(Visitor& v, State& state) {
-    auto& [constants, tracks, t, started, next_id, width, height, picture_known, process_noise, camera, camera_velocity, camera_path,
-           gaps, belief, offsets, accuracy, log_side_variance, sensors, ended, learnt_s] = state;
+    auto& [constants, tracks, t, started, next_id, width, height, picture_known, process_noise, camera, camera_velocity,
+           camera_path, gaps, belief, offsets, accuracy, log_side_variance, sensors, ended, learnt_s] = state;
     (void)constants;  // the caller's
     std::size_t S = sensors.size(), rows = tracks.size(), ended_rows = ended.size();
     v.whole("sensors", S);
@@ -205,8 +206,8 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     auto& [gaps_ended, ended_well] = gaps;
     v.numbers("gaps.ended", gaps_ended.data(), gaps_ended.size());
     v.numbers("gaps.ended_well", ended_well.data(), ended_well.size());
-    auto& [p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share, score_weight,
-           noise_share] = belief;
+    auto& [p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share,
+           score_weight, noise_share] = belief;
     v.column("belief.agreed_mean", agreed_mean, S, 1);
     v.column("belief.agreed_std", agreed_std, S, 1);
     v.column("belief.agreed_share", agreed_share, S, 1);
@@ -282,7 +283,8 @@ struct EntryColumns {
     Entry at(std::size_t k) const {
         Entry entry;
         entry.t = t[k], entry.dt = dt[k], entry.real = real[k], entry.later = later[k];
-        entry.used = used[k], entry.confirmed = confirmed[k], entry.missed = missed[k], entry.last_of_step = last_of_step[k];
+        entry.used = used[k], entry.confirmed = confirmed[k], entry.missed = missed[k],
+        entry.last_of_step = last_of_step[k];
         std::copy_n(&predicted_mean[k * kMean], kMean, entry.predicted_mean.begin());
         std::copy_n(&mean[k * kMean], kMean, entry.mean.begin());
         std::copy_n(&predicted_covariance[k * kWide], kWide, entry.predicted_covariance.begin());

@@ -52,11 +52,11 @@ struct AssociatedPairs {
     std::vector<association::Pair> made;            // tracks (rows), boxes (columns), ln L, in the order of tracks
     std::vector<std::array<double, 4>> innovation;  // of each of these
     std::vector<SidesExpected> expected;            // of all tracks
-    std::vector<SidesExpected> by_spread;           // of all pairs where the boxes have spreads of their own, else empty
-    std::vector<double> p_detect;                   // of all tracks
-    std::vector<std::size_t> pair_of;               // of all tracks, made.size() where there is none
-    std::vector<std::size_t> track_of;              // of all boxes; before births the number of tracks where none took it
-    std::vector<std::uint8_t> confirms;             // of all boxes: whether it tells that its track is still there
+    std::vector<SidesExpected> by_spread;  // of all pairs where the boxes have spreads of their own, else empty
+    std::vector<double> p_detect;          // of all tracks
+    std::vector<std::size_t> pair_of;      // of all tracks, made.size() where there is none
+    std::vector<std::size_t> track_of;     // of all boxes; before births the number of tracks where none took it
+    std::vector<std::uint8_t> confirms;    // of all boxes: whether it tells that its track is still there
 
     // What was expected of the box of a pair.
     const SidesExpected& expected_of(std::size_t pair) const {

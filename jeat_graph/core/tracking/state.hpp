@@ -30,20 +30,20 @@ using namespace jeat::filters;
 // All living tracks, in ascending order of identity; see ReferenceTracks for what the columns are.
 struct Tracks {
     std::vector<std::int64_t> track_id, used;
-    std::vector<double> mean, covariance;      // predict, follow_camera, update
-    std::vector<double> presence;              // predict, count_hits_and_misses
+    std::vector<double> mean, covariance;  // predict, follow_camera, update
+    std::vector<double> presence;          // predict, count_hits_and_misses
     std::vector<double> recent_hits, recent_misses;
-    std::vector<Sides> last_box;               // compare_sensors
+    std::vector<Sides> last_box;  // compare_sensors
     std::vector<double> last_box_s;
-    std::vector<double> apart, apart_s;        // compare_sensors
+    std::vector<double> apart, apart_s;  // compare_sensors
     std::vector<std::uint8_t> has_apart;
-    std::vector<double> innovation;            // learn_noise
+    std::vector<double> innovation;  // learn_noise
     std::vector<std::uint8_t> has_innovation;
     std::vector<double> real, log_odds, sees;  // judge
     // Where who is who is given: whose boxes it takes, below 0 for any that are nobody's; and whether more are to come.
-    std::vector<std::int64_t> given;           // begin_tracks
-    std::vector<std::uint8_t> awaited;         // begin_tracks, update
-    Evidence evidence;                         // count_hits_and_misses, compare_overlaps
+    std::vector<std::int64_t> given;    // begin_tracks
+    std::vector<std::uint8_t> awaited;  // begin_tracks, update
+    Evidence evidence;                  // count_hits_and_misses, compare_overlaps
 
     std::size_t size() const { return track_id.size(); }
     double* mean_of(std::size_t row) { return mean.data() + row * kMean; }
@@ -96,12 +96,12 @@ struct Tracks {
 
 // One sensor, beside what SensorBelief and OffsetSums have of it.
 struct Sensor {
-    double leftovers;                                             // count_clutter
-    double false_boxes = 0.0;                                     // count_false_boxes
-    double boxes_at_edge = 0.0, boxes_beyond = 0.0;               // begin_scan
-    double period_s = std::numeric_limits<double>::quiet_NaN();   // begin_scan
+    double leftovers;                                            // count_clutter
+    double false_boxes = 0.0;                                    // count_false_boxes
+    double boxes_at_edge = 0.0, boxes_beyond = 0.0;              // begin_scan
+    double period_s = std::numeric_limits<double>::quiet_NaN();  // begin_scan
     double last_scan_s = std::numeric_limits<double>::quiet_NaN();
-    RepeatCounts repetition;                                      // begin_scan
+    RepeatCounts repetition;  // begin_scan
     // What the user says of it: the logit of the score at which a box is as likely real as not, NaN where it is to
     // be learnt.
     double even_logit = std::numeric_limits<double>::quiet_NaN();
@@ -114,22 +114,22 @@ struct Sensor {
 struct State {
     ModelConstants constants;
     Tracks tracks;
-    double t = 0.0;                 // predict
+    double t = 0.0;  // predict
     bool started = false;
-    std::int64_t next_id = 1;       // begin_tracks
+    std::int64_t next_id = 1;          // begin_tracks
     double width = 1.0, height = 1.0;  // begin_scan, where the picture is not known
     bool picture_known = false;
-    ProcessNoise process_noise;     // learn_noise
-    CameraVariance camera;          // follow_camera
-    CameraVelocity camera_velocity; // follow_picture
-    CameraPath camera_path;         // predict, follow_picture, follow_camera
-    GapCounts gaps;                 // count_gaps, end_tracks
-    SensorBelief belief;            // learn
-    OffsetSums offsets;             // compare_sensors
-    AccuracySums accuracy;          // compare_sensors, learn
+    ProcessNoise process_noise;             // learn_noise
+    CameraVariance camera;                  // follow_camera
+    CameraVelocity camera_velocity;         // follow_picture
+    CameraPath camera_path;                 // predict, follow_picture, follow_camera
+    GapCounts gaps;                         // count_gaps, end_tracks
+    SensorBelief belief;                    // learn
+    OffsetSums offsets;                     // compare_sensors
+    AccuracySums accuracy;                  // compare_sensors, learn
     std::vector<double> log_side_variance;  // learn_noise
     std::vector<Sensor> sensors;
-    Evidence ended;                 // end_tracks
+    Evidence ended;  // end_tracks
     double learnt_s = -std::numeric_limits<double>::infinity();
 
     explicit State(const ModelConstants& c) : constants(c) {

@@ -97,7 +97,8 @@ inline void check_past(const std::string& name, double time, double now) {
 inline void check_evidence(const std::string& name, const Evidence& e, double now) {
     for (const std::int64_t owner : e.owner)
         require(owner >= 0 && static_cast<std::size_t>(owner) < e.sensors, name + "owner", "is no sensor");
-    for (const auto* column : {&e.hits, &e.misses, &e.stationary_hits, &e.stationary_misses, &e.recent_weight, &e.total_weight, &e.missed})
+    for (const auto* column :
+         {&e.hits, &e.misses, &e.stationary_hits, &e.stationary_misses, &e.recent_weight, &e.total_weight, &e.missed})
         check_counts(name + "counts", *column);
     for (std::size_t k = 0; k < e.hits.size(); ++k) {
         const double rounding = kShareRounding * (e.hits[k] + e.misses[k]);
@@ -152,10 +153,12 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
     check_past(name + "last_scan_s", sensor.last_scan_s, now);
     require(!(std::abs(sensor.even_logit) > kMostLogVariance), name + "even_logit", "is of no score");
     require(!(sensor.given_lasting < 0.0) && !(sensor.given_lasting > 1.0), name + "given_lasting", "is no variance");
-    require(!(sensor.mean_spread < kLeastSpread) && !(sensor.mean_spread > kMostSpread), name + "mean_spread", "is no variance");
+    require(!(sensor.mean_spread < kLeastSpread) && !(sensor.mean_spread > kMostSpread), name + "mean_spread",
+            "is no variance");
     const RepeatCounts& counts = sensor.repetition;
     for (int bin = 0; bin < kScoreBins; ++bin) {
-        const double boxes = counts.boxes[static_cast<std::size_t>(bin)], repeated = counts.repeated[static_cast<std::size_t>(bin)];
+        const double boxes = counts.boxes[static_cast<std::size_t>(bin)],
+                     repeated = counts.repeated[static_cast<std::size_t>(bin)];
         check_between(name + "boxes", boxes, 0.0, kMostCount);
         check_between(name + "repeated", repeated, 0.0, boxes * (1.0 + kShareRounding));
     }
@@ -175,7 +178,8 @@ inline void check_accuracy(const AccuracySums& sums) {
             const std::size_t at = i * S + j, back = j * S + i;
             require(sums.pairs[at] == sums.pairs[back] && sums.product[at] == sums.product[back], "accuracy",
                     "is not the same both ways");
-            require(std::abs(sums.product[at]) <= kMostLogSize * (sums.pairs[at] + 1.0), "accuracy.product", "is of no boxes");
+            require(std::abs(sums.product[at]) <= kMostLogSize * (sums.pairs[at] + 1.0), "accuracy.product",
+                    "is of no boxes");
         }
 }
 
@@ -193,7 +197,8 @@ inline void check_belief(const State& state) {
     check_between("belief.prior_odds", belief.prior_odds, -kMostLogVariance, kMostLogVariance);
     check_between("log_side_variance", state.log_side_variance, -kMostLogVariance, kMostLogVariance);
     const ProcessNoise& q = state.process_noise;
-    check_between("process_noise", std::array{q.jerk, q.growth, q.position, q.size}, -kMostLogVariance, kMostLogVariance);
+    check_between("process_noise", std::array{q.jerk, q.growth, q.position, q.size}, -kMostLogVariance,
+                  kMostLogVariance);
     for (const double variance : {state.camera.shift, state.camera.scale})
         require(variance > 0.0, "camera", "has no variance");
     check_counts("gaps.ended", state.gaps.ended);
@@ -275,7 +280,8 @@ inline void check_histories(Histories& histories, const State& state, bool smoot
     for (std::size_t i = 0; fits && i < living.size(); ++i) fits = living[i].track_id == state.tracks.track_id[i];
     require(fits, "histories.track_id", "are not those of the tracks");
     for (const History& history : living) {
-        require(history.called.track_id > 0 && history.called.track_id <= kMostIdentities, "histories.given", "are none");
+        require(history.called.track_id > 0 && history.called.track_id <= kMostIdentities, "histories.given",
+                "are none");
         require(!(history.called.share < 0.0) && !(history.called.share > 1.0), "histories.share", "are none");
         check_entries(history, state);
     }

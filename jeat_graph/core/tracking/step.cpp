@@ -51,9 +51,8 @@ ScanClock begin_scan(State& state, double t, const Scan& scan, association::Assi
     }
     if (!std::isnan(sensor.last_scan_s)) {
         const double since = t - sensor.last_scan_s;
-        sensor.period_s = std::isnan(sensor.period_s)
-                              ? since
-                              : kPeriodMemory * sensor.period_s + (1.0 - kPeriodMemory) * since;
+        sensor.period_s =
+            std::isnan(sensor.period_s) ? since : kPeriodMemory * sensor.period_s + (1.0 - kPeriodMemory) * since;
     }
     sensor.last_scan_s = t;
     sensor.repetition.count(scan.boxes, scan.logits, repeats, c);
@@ -76,9 +75,8 @@ void predict(State& state, double t, TimeStep& step) {
     Tracks& tracks = state.tracks;
     for (std::size_t i = 0; i < tracks.size(); ++i) {
         double* const mean = tracks.mean_of(i);
-        with_camera(mean, state.camera_velocity, dt, [&] {
-            filters::predict(mean, tracks.covariance_of(i), step.motion(), dt, densities, c);
-        });
+        with_camera(mean, state.camera_velocity, dt,
+                    [&] { filters::predict(mean, tracks.covariance_of(i), step.motion(), dt, densities, c); });
         predict_presence(tracks.presence_of(i), step.presence());
     }
 }
