@@ -42,11 +42,6 @@ class Identities:
         self._lost: IntArray = np.zeros(0, dtype=np.int64)
         self._unchanged = True  # whether own numbers and those given out are the same, of all from now on
 
-    @property
-    def next_given(self) -> int:
-        """The next identity to be given out."""
-        return self._next_given
-
     def of(self, own: IntArray) -> IntArray:
         """Return what was given out (N,) for tracks by their own numbers (N,), all of which are known."""
         return own if self._unchanged else self._given[np.searchsorted(self._own, own)]

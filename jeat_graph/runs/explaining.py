@@ -13,7 +13,7 @@ from scipy.special import expit
 from jeat_graph.config.schema import Config
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections, Scan
-from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.errors import ConfigError
 from jeat_graph.runs.measured import complete_record, recorded_inputs
 from jeat_graph.tracking.hypotheses import Hypotheses
 from jeat_graph.tracking.tracker import Tracker
@@ -98,28 +98,10 @@ class _ReplayedStep(NamedTuple):
     found: Hypotheses
 
 
-def explain_track(config: Config, detections: Detections, track_id: int) -> list[TrackMoment]:
-    """Return the moments of a track, from its first box to its end.
-
-    Args:
-        config: of the recording.
-        detections: as they were tracked.
-        track_id: identity of a track, be it reported or not.
-
-    Raises:
-        DataError: there is no such track.
-        ConfigError: the configuration's engine has no hypotheses.
-    """
-    found = explain_tracks(config, detections, {track_id})
-    if track_id not in found:
-        raise DataError(f"there is no track {track_id}")
-    return found[track_id]
-
-
 def explain_tracks(
     config: Config, detections: Detections, track_ids: Collection[int]
 ) -> dict[int, list[TrackMoment]]:
-    """Return the moments of tracks by their identity, as `explain_track`; without those that there are not.
+    """Return the moments of tracks by their identity, from first box to end; of those that there are.
 
     Args:
         config: of the recording.

@@ -213,11 +213,6 @@ class CorridorService:
         with self._lock:
             return self._live.shown()
 
-    def saved_age_s(self) -> float | None:
-        """Return how long ago (s) the corridor's checkpoint was written, or None."""
-        saved = self._status.saved
-        return None if saved is None else time.monotonic() - saved
-
     def health(self) -> dict[str, Any]:
         """Return what `/health` says, as plain data."""
         shown, own = self.corridor(), self._status.health()
