@@ -58,6 +58,7 @@ class Scan:
         t = time_of(self.t)
         if not isinstance(self.sensor, str):
             raise DataError(f"sensor is the name of the sensor (a text), got {self.sensor!r}")
+        object.__setattr__(self, "sensor", str(self.sensor))  # NumPy's texts name themselves otherwise
         boxes, scores = check_boxes(self.boxes, self.scores)
         object.__setattr__(self, "t", t)
         object.__setattr__(self, "boxes", boxes)

@@ -63,7 +63,11 @@ def yolo(path, rows):
     return path
 
 
-pytestmark = pytest.mark.filterwarnings("ignore:.*lie before or after the truth")
+# What is decided is said in a warning, which `test_python_says_it_in_a_warning` looks at.
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:.*lie before or after the truth"),
+    pytest.mark.filterwarnings("ignore:.*frames count from 0, as those of"),
+]
 OPEN = (mot, csv, parquet, coco, yolo)
 
 

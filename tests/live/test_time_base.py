@@ -11,7 +11,7 @@ from jeat_graph.data.trajectories import Trajectories
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.tracker import Tracker
 
-CONFIG = load_config("default", ["smoother.lag_s=0.3"])
+CONFIG = load_config("default", ["smoother.lag_s=0.3", "image.width=1920"])
 COLUMNS = ("t", "track_id", "boxes", "existence", "mean", "var", "used")
 
 
@@ -91,6 +91,7 @@ def test_a_recording_that_pauses_for_an_hour_loses_nothing(alone, policy):
     assert live.lateness.summary()["rgb"].dropped == 0
 
 
+@pytest.mark.filterwarnings("ignore:.*median step of 10 s")
 def test_a_sensor_with_long_pauses_is_taken_at_once():
     live = LiveTracker(Tracker(CONFIG))
     waits = [bool(live.step(scan(10.0 * k, since=10.0 * k)).held) for k in range(12)]

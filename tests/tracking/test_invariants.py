@@ -17,6 +17,8 @@ PRESETS = ("default", "paper")
 # Most of this is about the filter; one test below lets the presets' smoothers run as well.
 PUBLISHED = {name: load_config(name) for name in PRESETS}
 CONFIGS = {name: load_config(name, ["smoother.engine=none"]) for name in PRESETS}
+# Whatever is drawn may look like a mistake, and be warned of.
+pytestmark = pytest.mark.filterwarnings("ignore::jeat_graph.data.errors.InputWarning")
 SENSORS = ("evt", "rgb")
 TIMES = 10 if os.environ.get("JEAT_GRAPH_FULL", "") not in ("", "0") else 1
 
@@ -149,6 +151,7 @@ def test_scans_a_microsecond_apart_reach_the_smoother_at_any_epoch(epoch):
     assert np.allclose(table.mean[:, :2], [120, 115], atol=0.1)
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # powers of a thousand million seconds overflow
 @pytest.mark.parametrize("preset", PRESETS)
 def test_one_batch_of_the_largest_and_smallest_numbers_does_no_harm(preset):
     tracker = Tracker(CONFIGS[preset])
