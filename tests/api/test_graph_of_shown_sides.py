@@ -1,4 +1,4 @@
-"""A side that shows again: to graph and smoother alike it is part of the prediction."""
+"""A side that shows again: to graph and smoother it is part of the prediction."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def test_the_standard_error_of_a_mean_is_the_textbook_one():
 
 
 def test_changes_are_paired():
-    """All recordings lose alike, so the change has no error although the scores have."""
+    """All recordings lose the same, so the change has no error although the scores have."""
     rng = np.random.default_rng(4)
     counts = np.zeros((5, 5 + 2 * 19))
     counts[:, 0] = 1000.0

@@ -1,4 +1,4 @@
-"""`--detector-frames` and its like where boxes come from a file or a pipe: what made them is told."""
+"""`--detector-frames` and its like where boxes come from a file or a pipe: what made them is declared."""
 
 from __future__ import annotations
 

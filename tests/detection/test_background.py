@@ -101,7 +101,7 @@ def test_pictures_of_any_size(size):
 
 
 def test_what_was_usual_is_forgotten():
-    """After a leap in time the light may be another: what is usual is learnt anew, at once."""
+    """After a leap in time the light may be another: what is usual is learnt again, at once."""
     settings = BackgroundSettings()
     first, then = UsualActivity((96, 80), RATE_HZ, settings), UsualActivity((96, 80), RATE_HZ, settings)
     for window in windows(0.1, 5):

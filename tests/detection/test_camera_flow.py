@@ -36,7 +36,7 @@ def seen(grey, pose=(0.0, 0.0, 0.0, 0.0), noise=2.0, seed=0):
 
 
 def motions(frames, boxes=None):
-    """The motions that are told of pictures, one a picture or None."""
+    """The motions that are reported of pictures, one a picture or None."""
     flow = CameraFlow(CameraSettings(follow=True))
     out = []
     for k, frame in enumerate(frames):

@@ -116,7 +116,7 @@ def test_commands_are_understood(words):
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_configurations_that_a_page_names_are_there(page):
-    """In blocks and in prose alike: what `--config` takes is a preset, a file, or stands for a name."""
+    """In blocks and in prose: what `--config` takes is a preset, a file, or stands for a name."""
     named = re.findall(r"--config[= ]([^\s`'\"|,;)\]]+)", page.read_text(encoding="utf-8"))
     stand_ins = {"FILE", "NAME", "NAME|FILE", "…", "NAME|FILE.yaml"}
     there = {path.stem for path in (ROOT / "configs").glob("*.yaml")}

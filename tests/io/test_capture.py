@@ -87,7 +87,7 @@ class TestWallClock:
 
 
 class FakeCamera:
-    """Gives numbers, and breaks off or fails as it is told."""
+    """Gives numbers, and breaks off or fails where it is to."""
 
     def __init__(self, script):
         self.script, self.closed = iter(script), 0

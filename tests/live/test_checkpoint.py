@@ -30,7 +30,7 @@ def batches():
 
 
 def assert_equal(one, other, rounding=0.0):
-    """Equal to the last byte, or to so many px where GTSAM sums what it was told in another order."""
+    """Equal to the last byte, or to so many px where GTSAM sums the same in another order."""
     assert len(one) == len(other)
     for name in COLUMNS:
         a, b = getattr(one, name), getattr(other, name)

@@ -1,4 +1,4 @@
-"""How often a broker is told what has been taken: a fast source writes no storm of checkpoints."""
+"""How often what was taken is confirmed to a broker: a fast source writes no storm of checkpoints."""
 
 from __future__ import annotations
 

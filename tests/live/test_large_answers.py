@@ -1,4 +1,4 @@
-"""An answer that is larger than a broker takes: told of, counted and not sent, and the next ones arrive."""
+"""An answer that is larger than a broker takes: reported, counted and not sent, and the next ones arrive."""
 
 from __future__ import annotations
 

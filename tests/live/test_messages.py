@@ -1,4 +1,4 @@
-"""Messages of scans and tracks: one format in two encodings; duplicates are told by source and number."""
+"""Messages of scans and tracks: one format in two encodings; duplicates are known by source and number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""After any wrong times, restarts and saved states the vehicle is found again, and silence is told of."""
+"""After any wrong times, restarts and saved states the vehicle is found again, and silence is reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A live session: detectors that are started again, what is told of it, and what a checkpoint knows."""
+"""A live session: detectors that are started again, what is reported of it, and what a checkpoint knows."""
 
 from __future__ import annotations
 

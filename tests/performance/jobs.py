@@ -20,7 +20,7 @@ LAGGED = load_config("paper", ["smoother.engine=gtsam"])
 
 
 def traffic(num):
-    """Scans at 100 Hz: three vehicles that start anew every 3 s, clutter, and scans without detections."""
+    """Scans at 100 Hz: three vehicles that start again every 3 s, clutter, and scans without detections."""
     rng = np.random.default_rng(0)
     size = np.array([40.0, 30.0])
     clutter = np.hstack([rng.uniform([0, 0], [1200, 650], (997, 2)), rng.uniform(10, 60, (997, 2))])

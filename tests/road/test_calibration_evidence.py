@@ -1,4 +1,4 @@
-"""What evidence says of a camera: clicks count once, and a scene's size is told by what was measured."""
+"""What evidence says of a camera: clicks count once, and a scene's size is known by what was measured."""
 
 from __future__ import annotations
 

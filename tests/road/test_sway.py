@@ -23,7 +23,7 @@ def sway(t, rng):
 
 
 def seen(path, creeping_kmh=0.0):
-    """Write boxes of six cars, all shifted alike, with the noise of a good detector."""
+    """Write boxes of six cars, all shifted by the same, with the noise of a good detector."""
     rng, t = np.random.default_rng(4), np.arange(0.0, SECONDS, 1.0 / RATE)
     shift = np.stack([sway(t, rng), sway(t, rng)], axis=1)
     assert np.sqrt((shift**2).mean()) > 1.5
@@ -69,7 +69,7 @@ def test_vehicles_that_stand_have_no_speed(tmp_path):
 
 
 def logged(shift, standing=6, driving=3, stated_px=8.0):
-    """A log of vehicles that stand or drive, with noise of 1.5 px; all boxes are shifted alike."""
+    """A log of vehicles that stand or drive, with noise of 1.5 px; all boxes are shifted by the same."""
     rng, t = np.random.default_rng(1), np.arange(len(shift)) / RATE
     parts = []
     for k in range(standing + driving):

@@ -369,7 +369,7 @@ def test_boxes_that_do_not_count_are_nobodys():
 
 
 def test_what_is_cut_off_keeps_the_rows_of_the_track_that_it_was_of():
-    """Of a weak object: what begins anew in its midst is not believed for a while."""
+    """Of a weak object: what begins again in its midst is not believed for a while."""
     rng = np.random.default_rng(3)
     scans = []
     for k in range(80):

@@ -14,7 +14,7 @@ CODE = (type, ModuleType, FunctionType, BuiltinFunctionType)
 
 
 def scans_100_hz(num, seed=0):
-    """Endless traffic: three vehicles that start anew every 3 s, clutter, and empty scans."""
+    """Endless traffic: three vehicles that start again every 3 s, clutter, and empty scans."""
     rng = np.random.default_rng(seed)
     size = np.array([40.0, 30.0])
     clutter = np.hstack([rng.uniform([0, 0], [1200, 650], (997, 2)), rng.uniform(10, 60, (997, 2))])

@@ -1,4 +1,4 @@
-"""What the model's tracker tells beside its tables, and what it is told of its sensors."""
+"""What the model's tracker returns beside its tables, and what is declared of its sensors."""
 
 from __future__ import annotations
 

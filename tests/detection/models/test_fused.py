@@ -1,4 +1,4 @@
-"""The detector of both sensors: each window with the newest picture, told how old it is, or without one."""
+"""The detector of both sensors: each window with the newest picture and its age, or without one."""
 
 from __future__ import annotations
 

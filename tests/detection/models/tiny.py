@@ -1,4 +1,4 @@
-"""Tiny ONNX files: they answer with what they are told, whatever they are shown, and may count windows."""
+"""Tiny ONNX files: their answers are fixed, whatever they are shown, and may count windows."""
 
 from __future__ import annotations
 

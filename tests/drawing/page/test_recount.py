@@ -1,4 +1,4 @@
-"""The page of a recount: pairs one to one, Wilson's intervals, and nothing told before the end."""
+"""The page of a recount: pairs one to one, Wilson's intervals, and nothing shown before the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Columns and units of time are told by the data, or left to the user; never guessed wrongly."""
+"""Columns and units of time are recognised by the data, or left to the user; never guessed wrongly."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_the_unit_of_a_usual_recording_is_told(size, hz_px, unit, start_s, seed)
     seed=st.integers(0, 1000),
 )
 def test_a_recording_of_a_camera_is_never_taken_for_another_unit(size, hz_px, unit, seed):
-    """However quiet or busy: right or not told. Cameras' clocks count µs."""
+    """However quiet or busy: right or not guessed. Cameras' clocks count µs."""
     t_us, x, y, _ = events(3000, hz_px * size[0] * size[1], size, seed)
     t = {"s": t_us / 1e6, "ms": t_us / 1e3, "us": t_us, "ns": t_us * 1000}[unit]
     assert unit_of(t, x, y) in (unit, None)
