@@ -104,7 +104,7 @@ def join(
         span: first and last time of the recording (s).
         step_s: time from one scan to the next (s).
         past: what was decided before, of other pieces.
-        likeness: (E,) ln of the ratio that looks give each; None where nothing is known of looks.
+        likeness: (E,) ln of the ratio that appearance gives each; None where nothing is known of it.
     """
     before = Past.none() if past is None else past
     u = pieces.begins[possible.head] - pieces.ends[possible.tail]

@@ -7,7 +7,7 @@ information 1/μ − 1 along each singular vector. Both are exact whatever the m
 
 Rows are on ξ, x = m + L ξ, where m and L are the filter's at that state. So each state has a scale of its own
 and is counted from where the filter had it: all numbers are about 1, be a step a microsecond or five minutes
-long. Records that nothing parts (sensors that look at one time) share a state.
+long. Records that nothing parts (sensors with scans of one time) share a state.
 """
 
 from __future__ import annotations

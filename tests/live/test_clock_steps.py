@@ -1,4 +1,4 @@
-"""A clock that steps in a live stream is distinguished from a pause, taken off and named; a drift is followed."""
+"""A clock that steps in a live stream is known from a pause, taken off and named; a drift is followed."""
 
 from __future__ import annotations
 

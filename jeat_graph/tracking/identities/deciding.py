@@ -230,7 +230,7 @@ def _joined(
     votes = _of_pairs(links, *voted, len(members)) / len(assigned)
     likeness = None
     if recording.embeddings is not None:
-        # By links that neither looks nor the passes decide, which weighed looks, too.
+        # By links that neither appearance nor the passes decide, which weighed appearance, too.
         plain = join(pieces, links, np.zeros(len(votes)), span, step, past)
         ends = (_columns(members, from_end=True), _columns(members, from_end=False))
         cosine = link_cosines(recording.embeddings, seen.sensor, *ends, links)

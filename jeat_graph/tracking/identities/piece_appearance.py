@@ -1,7 +1,7 @@
 """What pieces of tracks look like where they end and where they begin, and what that says of links.
 
 The embeddings of one sensor are compared with each other. How much more similar one object looks than two is
-learnt for each sensor from the links, by the probabilities that these have without looks.
+learnt for each sensor from the links, by the probabilities that these have without appearance.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ def link_cosines(
 
 
 def learnt_likeness(cosine: FloatArray, probability: FloatArray) -> FloatArray:
-    """Return ln of the ratio (L,) of "one object" to "two" that looks give links; 0 where they tell nothing.
+    """Return ln of the ratio (L,) of "one object" to "two" that appearance gives links; 0 where they tell nothing.
 
     Args:
         cosine: (S, L) of each link, for each sensor.
-        probability: (L,) that it joins one object, by what is not its looks.
+        probability: (L,) that it joins one object, by all but its appearance.
     """
     out = np.zeros(len(probability))
     for one in cosine:
