@@ -35,7 +35,7 @@ def link_cosines(
 
 
 def learnt_likeness(cosine: FloatArray, probability: FloatArray) -> FloatArray:
-    """Return ln of the ratio (L,) of "one object" to "two" that appearance gives links; 0 where they tell nothing.
+    """Return ln of the ratio (L,) of "one object" to "two" that appearance gives links; 0: it says nothing.
 
     Args:
         cosine: (S, L) of each link, for each sensor.
