@@ -194,6 +194,16 @@ def test_what_would_end_a_start_is_said_before(old, new, words, checked):
     assert said.count("\n") == 1
 
 
+def test_a_camera_without_the_embedder_that_was_learnt_with_is_told_of(checked):
+    pytest.importorskip("nats", reason="the client is not installed")
+    source = "B: {sources: [{frames: 'rtsp://cam/road', detector: motion%s}]},"
+    code, said = checked("B: ,", source % "")
+    assert code == 0
+    assert "cameras.B.sources[0]: names no embedder, and " in said
+    assert "cameras.A" not in said
+    assert "embedder" not in checked("B: ,", source % ", embedder: colour")[1]
+
+
 def test_lanes_of_other_names_than_learnt_are_refused(tmp_path, capsys):
     pytest.importorskip("nats", reason="the client is not installed")
     path = scene.written(tmp_path)

@@ -170,7 +170,22 @@ def read_corridor_service(path: str | Path) -> tuple[CorridorConfig, list[str]] 
     except ConfigError as error:
         raise with_line(error, str(path), lines_of(text)) from None
     found = [*made.cameras.values(), ServiceConfig(sinks=made.sinks)]
-    return made, [line for one in found for line in warnings_of(one, Path(path))]
+    return made, [*(line for one in found for line in warnings_of(one, Path(path))), *_not_described(made)]
+
+
+def _not_described(config: CorridorConfig) -> list[str]:
+    """Return which cameras describe nothing of what was learnt to be compared."""
+    try:
+        compared = {name for gap in config.gaps() if gap.numbers for name in (gap.first, gap.second)}
+    except DataError:
+        return []  # told of when all is checked
+    return [
+        f"cameras.{name}.sources[{k}]: names no embedder, and {config.follow.learnt} was learnt with one: "
+        "what its vehicles look like is not compared"
+        for name, one in config.cameras.items()
+        for k, source in enumerate(one.sources)
+        if name in compared and source.frames is not None and source.embedder is None
+    ]
 
 
 def _made(tree: Mapping[str, Any], folder: Path) -> CorridorConfig:
