@@ -67,6 +67,7 @@ KINDS = {
         "benchmarks.rigs",
         "pictures and clocks of two cameras brought together by the traffic they saw",
     ),
+    "clocks": ("benchmarks.clocks", "live streams in which the clock of one sensor steps or drifts"),
     "joint": (
         "benchmarks.joint",
         "two sensors at one time, associated scan by scan or in one joint problem",
