@@ -156,14 +156,16 @@ class PictureMap:
 
     def std_px(self, own: tuple[float, float]) -> float:
         """Return by how much a mapped centre is uncertain, rms over an own picture of that size (px)."""
-        if not self.covariance.any():
-            return 0.0
+        _, std = self.std_by_place(own)
+        return float(np.sqrt(np.mean(std**2))) if len(std) else 0.0
+
+    def std_by_place(self, own: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+        """Return places (N, 2) spread over an own picture of that size, and the same at each (N,), in px."""
         xy, height = _spread(own)
         seen = np.isfinite(self.points(xy, height)).all(axis=1)
         J = self.jacobian(xy[seen], height[seen])
-        if not len(J):
-            return 0.0
-        return float(np.sqrt(np.mean(np.einsum("nij,jk,nik->ni", J, self.covariance, J))))
+        variance = np.einsum("nij,jk,nik->ni", J, self.covariance, J)
+        return xy[seen], np.sqrt(np.maximum(variance.mean(axis=1), 0.0))
 
     def gain(self, own: tuple[float, float]) -> float:
         """Return how many common pixels an own one is, in the mean over an own picture of that size."""

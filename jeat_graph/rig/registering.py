@@ -264,6 +264,16 @@ def _undetermined(names: tuple[str, str], why: str) -> DataError:
     )
 
 
+def _by_place(way: PictureMap, own: tuple[float, float]) -> str:
+    """Say where in the own picture the map is known best and least; nothing where no place is in view."""
+    places, std = way.std_by_place(own)
+    if not len(std):
+        return ""
+    best, worst = int(np.argmin(std)), int(np.argmax(std))
+    where = [f"± {std[k]:.2g} px at {places[k, 0]:.0f},{places[k, 1]:.0f}" for k in (best, worst)]
+    return f" ({where[0]}, {where[1]})"
+
+
 def _lines(
     refined: Refined, matched: MatchedTracks, names: tuple[str, str], own: tuple[float, float]
 ) -> list[str]:
@@ -271,7 +281,8 @@ def _lines(
     drift = f"drift {clock.drift_ppm:.1f} ± {clock.drift_std_ppm:.1f} ppm"
     return [
         f"{names[1]}: {len(matched.a)} of {matched.possible} vehicles matched with {names[0]}'s",
-        f"{names[1]}: boxes go to the picture of {names[0]} to ± {std:.2g} px over the whole picture; "
+        f"{names[1]}: boxes go to the picture of {names[0]} to ± {std:.2g} px over the whole picture"
+        f"{_by_place(refined.way, own)}; "
         f"residuals {refined.residual_px[0]:.2g} px of {names[0]}, {refined.residual_px[1]:.2g} px of "
         f"{names[1]}, of boxes of {refined.sizes_px:.0f} px",
         f"{names[1]}: clock {clock.offset_s:.4f} s ± {1e3 * clock.offset_std_s:.1f} ms ahead at its "

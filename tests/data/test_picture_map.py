@@ -62,6 +62,22 @@ def test_the_uncertainty_of_a_shift_is_that_of_the_points() -> None:
     assert PictureMap.of_numbers(np.eye(3).ravel(), covariance).std_px((640, 480)) == pytest.approx(2.0)
 
 
+def test_the_uncertainty_at_a_place_is_the_scatter_of_drawn_maps() -> None:
+    """The far corner is known less than the middle; rms over places is that over the whole picture."""
+    rng = np.random.default_rng(0)
+    numbers = np.array([1.1, 0.05, 20.0, -0.03, 0.9, 10.0, 1e-5, 2e-5, 1.0])
+    covariance = np.diag([1e-4, 1e-4, 1.0, 1e-4, 1e-4, 1.0, 1e-10, 1e-10])
+    way = PictureMap.of_numbers(numbers, covariance)
+    places, std = way.std_by_place((640, 480))
+    there = []
+    for noise in rng.multivariate_normal(np.zeros(8), covariance, 4000):
+        there.append(PictureMap.of_numbers(numbers + np.append(noise, 0.0)).points(places))
+    want = np.sqrt(np.var(there, axis=0).mean(axis=1))
+    np.testing.assert_allclose(std, want, rtol=0.05)
+    assert std[-1] == std.max() > 1.5 * std.min()
+    assert way.std_px((640, 480)) == pytest.approx(np.sqrt(np.mean(std**2)))
+
+
 def test_covariances_of_both_kinds_of_matrix_mean_the_same() -> None:
     numbers, covariance = np.eye(3, 4), np.diag(np.arange(1.0, 12.0) * 1e-6)
     whole = PictureMap.of_numbers(numbers.ravel(), covariance)
