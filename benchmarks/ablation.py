@@ -63,6 +63,7 @@ TERMS: dict[str, dict[str, Any]] = {
     "objects that a sensor never sees": {"unseen_share": _NEVER, "unseen_bounds": (_NEVER, _NEVER)},
     "objects that it does not see while they stand": {
         "stationary_unseen_share": _NEVER,
+        "event_stationary_unseen_share": _NEVER,
         "stationary_unseen_bounds": (_NEVER, _NEVER),
     },
     "false objects that two sensors share": {"shared_false": _NEVER},

@@ -121,7 +121,7 @@ def tables(result: Mapping[str, Any]) -> dict[str, Table]:
 
     draws = result["draws"]
     digits = {**{f"{name} gained": 1 for name in HEADLINE}, "fail %": 0, "worse by 8 %": 0, "worst": 1}
-    digits |= {"ANEES (median)": 2, "ANEES .7 to 1.5 (%)": 0}
+    digits |= {"ANEES (median)": 2, "ANEES 0.7 to 1.5 (%)": 0}
     by_union = [_row(draws, (union,), {"joined": union}) for union in UNIONS]
     by_way = [
         _row([one for one in draws if one["way"] == way], UNIONS, {"drawn": way})
@@ -151,5 +151,5 @@ def _row(
         "worse by 8 %": 100.0 * float(np.mean(worst < -_MUCH)),
         "worst": float(worst.min()),
         "ANEES (median)": float(np.nanmedian(anees)),
-        "ANEES .7 to 1.5 (%)": 100.0 * float(honest.mean()),
+        "ANEES 0.7 to 1.5 (%)": 100.0 * float(honest.mean()),
     }

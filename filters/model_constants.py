@@ -92,8 +92,9 @@ class ModelConstants:
             same data, so the share is bounded; few objects of a sort teach that there are none, so it does
             not fall below its prior.
         stationary_speed: speed below which an object is taken to stand (sizes/s).
-        stationary_unseen_share: share of real objects that a sensor does not see while they stand. Prior; an
-            event camera teaches more.
+        stationary_unseen_share: share of real objects that a sensor does not see while they stand. Prior.
+        event_stationary_unseen_share: the same of one that is told to be an event camera. Prior; measured on
+            simulated roads.
         stationary_unseen_bounds: of the learnt share.
         shared_false: share of persistent false objects that another sensor reports, too.
         noise_share: prior odds of noise that is seen once, as a probability. Prior.
@@ -224,6 +225,7 @@ class ModelConstants:
     unseen_bounds: tuple[float, float] = (0.2, 0.9)
     stationary_speed: float = 0.3
     stationary_unseen_share: float = 0.05
+    event_stationary_unseen_share: float = 0.5
     stationary_unseen_bounds: tuple[float, float] = (0.02, 0.8)
     shared_false: float = 0.3
     noise_share: float = 0.5

@@ -58,6 +58,8 @@ class SensorBelief(NamedTuple):
             another sensor finds as well.
         agreed_share: (S,) how far these are believed, 0 before any.
         score_weight: (S,) weight of its scores as evidence, as the user says; 1 where he says nothing.
+        stationary_prior: (S,) prior of b, by what the sensor is; of a sensor alone the usual one, since b is
+            about what the others see.
         noise_share: prior share ν of noise among what is not real.
     """
 
@@ -70,6 +72,7 @@ class SensorBelief(NamedTuple):
     agreed_std: FloatArray
     agreed_share: FloatArray
     score_weight: FloatArray
+    stationary_prior: FloatArray
     noise_share: float
 
 
@@ -121,12 +124,24 @@ class Posterior(NamedTuple):
     scores: FloatArray
 
 
-def initial_sensor(c: ModelConstants) -> SensorBelief:
-    """Return the model of one sensor before anything is learnt."""
+def initial_sensor(
+    c: ModelConstants, score_weight: float = 1.0, stationary_prior: float | None = None
+) -> SensorBelief:
+    """Return the model of one sensor before anything is learnt, but for what the user says."""
     one = np.ones(1)
-    shares = c.p_detect * one, c.unseen_share * one, c.stationary_unseen_share * one
+    usual = c.stationary_unseen_share * one
     return SensorBelief(
-        *shares, 0.0 * one, 0.0 * one, 0.0 * one, c.agreed_std * one, 0.0 * one, one, c.noise_share
+        p_detect=c.p_detect * one,
+        unseen=c.unseen_share * one,
+        stationary_unseen=usual,
+        decision_threshold=0.0 * one,
+        prior_odds=0.0 * one,
+        agreed_mean=0.0 * one,
+        agreed_std=c.agreed_std * one,
+        agreed_share=0.0 * one,
+        score_weight=score_weight * one,
+        stationary_prior=usual if stationary_prior is None else stationary_prior * one,
+        noise_share=c.noise_share,
     )
 
 
@@ -287,6 +302,28 @@ def log_odds_terms(evidence: Evidence, sensors: SensorBelief, c: ModelConstants)
     )
 
 
+def sensor_effects(
+    evidence: Evidence, sensors: SensorBelief, c: ModelConstants
+) -> tuple[FloatArray, FloatArray]:
+    """Return how what is known of each sensor changed the log odds of tracks, two arrays (N, S).
+
+    Against the same sensor if it surely saw what stands (b = 0); and if its scores counted in full, whoever
+    contradicts them.
+    """
+    actual = posterior(evidence, sensors, c).log_odds
+    stood, scores = np.zeros(evidence.hits.shape), np.zeros(evidence.hits.shape)
+    for s in range(evidence.hits.shape[1]):
+        one = np.arange(evidence.hits.shape[1]) == s
+        sees = sensors._replace(stationary_unseen=np.where(one, _LEAST_WEIGHT, sensors.stationary_unseen))
+        believed = sensors._replace(
+            score_weight=np.where(one, 1.0, sensors.score_weight),
+            agreed_share=np.where(one, 0.0, sensors.agreed_share),
+        )
+        stood[:, s] = actual - posterior(evidence, sees, c).log_odds
+        scores[:, s] = actual - posterior(evidence, believed, c).log_odds
+    return stood, scores
+
+
 def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) -> SensorBelief:
     """Estimate the sensors' parameters from tracks, weighted by their posteriors (two rounds of EM).
 
@@ -311,7 +348,8 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
         hits = weight * (evidence.hits - blind * evidence.stationary_hits)
         p_detect = _share(hits, weight * (scans - blind * stood), c.p_detect, c.p_detect_count)
         weight = seen * (stood > _LEAST_SCANS)
-        stationary = _share(weight * blind, weight, c.stationary_unseen_share, c.sensor_count)
+        prior = sensors.stationary_prior if len(sensors.p_detect) > 1 else c.stationary_unseen_share
+        stationary = _share(weight * blind, weight, prior, c.sensor_count)
         weight = real * (scans > _LEAST_SCANS)
         unseen = _share(weight * belief.unseen, weight, c.unseen_share, c.sensor_count)
         false = (1.0 - belief.real)[informative]
@@ -330,6 +368,7 @@ def learn_sensors(evidence: Evidence, sensors: SensorBelief, c: ModelConstants) 
             agreed_std=agreed[1],
             agreed_share=agreed[2],
             score_weight=sensors.score_weight,
+            stationary_prior=sensors.stationary_prior,
             noise_share=float(np.clip(noise, *c.noise_bounds)),
         )
     return sensors
@@ -355,6 +394,6 @@ def _agreed_scores(
     )
 
 
-def _share(hits: FloatArray, of: FloatArray, prior: float, count: float) -> FloatArray:
+def _share(hits: FloatArray, of: FloatArray, prior: float | FloatArray, count: float) -> FloatArray:
     """Return the mean of a Beta posterior: (Σ hits + count · prior) / (Σ of + count), summed over tracks."""
     return np.asarray((hits.sum(axis=0) + count * prior) / (of.sum(axis=0) + count))

@@ -207,15 +207,16 @@ def made_by(args: argparse.Namespace, say: Callable[[str], object]) -> list[str]
     if not networks:
         return []
     from jeat_graph.data.errors import ConfigError
-    from jeat_graph.detection.declared import declared_of
+    from jeat_graph.detection.declared import known_of_networks
+    from jeat_graph.io.tables.sensor_columns import as_settings
 
     named = ", ".join(f"--detector-{options[sensor]}" for sensor in networks)
     if args.config != DEFAULT:
         raise ConfigError(f"{named} tells the configuration `default` of boxes; {args.config} says it itself")
-    settings = declared_of(networks, say)
-    if not settings:
+    known = known_of_networks(networks, say)
+    if all(keys.keys() <= {"kind"} for keys in known.values()):
         raise ConfigError(f"{named}: nothing beside the network tells what its boxes are like")
-    return settings
+    return as_settings(known)
 
 
 def _without_input(args: argparse.Namespace) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from jeat_graph.cli.identity_texts import identity_texts
 from jeat_graph.cli.progress import stages
-from jeat_graph.cli.sensor_texts import sensor_texts
+from jeat_graph.cli.sensor_texts import effect_texts, sensor_texts
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.eval.tables import FORMATS
 
@@ -114,6 +114,7 @@ def _text_of_track(moments: Sequence[TrackMoment], track_id: int, form: str) -> 
     strongest = sorted(last.terms.items(), key=lambda term: -abs(term[1]))[:3]
     terms = ", ".join(f"{name} {value:+.1f}" for name, value in strongest)
     lines.append(f"at its end: log odds {last.log_odds:+.1f} ({terms}); {last.reason}")
+    lines += effect_texts(last.effects)
     places = [round(k * (len(moments) - 1) / (_ROWS - 1)) for k in range(_ROWS)]
     rows = [moments[k] for k in dict.fromkeys(places)]
     return [*lines, "", _table(rows).render(form).rstrip()]

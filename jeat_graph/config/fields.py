@@ -21,8 +21,8 @@ def number(
     return field(default=default, metadata=meta)
 
 
-def choice(default: str, options: tuple[str, ...], doc: str) -> Any:
-    """Declare a text field that takes one of `options`."""
+def choice(default: str | None, options: tuple[str, ...], doc: str) -> Any:
+    """Declare a text field that takes one of `options`, or nothing where that is its default."""
     return field(default=default, metadata={"options": options, "doc": doc})
 
 
@@ -42,7 +42,8 @@ def check(section: Any) -> None:
     """
     for f in fields(section):
         value, meta = getattr(section, f.name), f.metadata
-        if "options" in meta and value not in meta["options"]:
+        is_nothing = value is None and f.default is None
+        if "options" in meta and value not in meta["options"] and not is_nothing:
             raise ConfigError(f"{f.name}: {value!r} is not one of {', '.join(meta['options'])}")
         if "low" in meta and value is not None:
             for v in value if isinstance(value, tuple) else (value,):

@@ -5,6 +5,7 @@ image: [1280, 720]            # the common picture, that of the tables
 sensors:
   rgb: {image: [1280, 720], to_picture: none}
   evt:
+    kind: event               # or camera, or other
     image: [640, 480]
     to_picture: [[1.9, 0.01, 8.2], [-0.01, 1.9, 60.5], [0, 0, 1]]   # or scale; 3 x 4 with parallax
     covariance: [...]         # of its numbers but the last of the 3 x 3, row by row
@@ -25,7 +26,7 @@ from typing import Any
 
 import yaml
 
-from jeat_graph.config.sensors import ClockConfig
+from jeat_graph.config.sensors import KINDS, ClockConfig
 from jeat_graph.config.yaml_text import load_yaml
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.picture_map import PictureMap
@@ -34,7 +35,7 @@ from jeat_graph.data.picture_map import PictureMap
 NONE, SCALE = "none", "scale"
 _TOP = ("image", "sensors")
 _CLOCK = tuple(one.name for one in dataclasses.fields(ClockConfig))
-_SENSOR = ("image", "to_picture", "covariance", *_CLOCK)
+_SENSOR = ("kind", "image", "to_picture", "covariance", *_CLOCK)
 _SHAPES = ((3, 3), (3, 4))
 # Digits of what is written: boxes are good to a hundredth of a pixel, clocks to a microsecond.
 _DIGITS, _TIME_PLACES, _DRIFT_PLACES = 9, 6, 3
@@ -113,6 +114,10 @@ def _short(value: float) -> float:
 def _sensor(one: Any, where: str, common: tuple[float, float] | None, file: Path) -> dict[str, Any]:
     _check_keys(one, _SENSOR, where + ".", file)
     out: dict[str, Any] = {}
+    if "kind" in one:
+        if one["kind"] not in KINDS:
+            raise DataError(f"{where}.kind: {str(one['kind'])[:40]!r} is not one of {', '.join(KINDS)}", file)
+        out["kind"] = one["kind"]
     own = _size(one["image"], f"{where}.image", file) if "image" in one else None
     way = one.get("to_picture", NONE if own is None or own == common else SCALE)
     if way == NONE and own is not None and common is not None and own != common:

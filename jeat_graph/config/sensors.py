@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from jeat_graph.config.fields import LARGEST, Section, choice, number
 from jeat_graph.data.errors import ConfigError
 
+#: What a sensor may be: one that sees changes alone, one that sees what is there, something else.
+KINDS = EVENT, CAMERA, OTHER = "event", "camera", "other"
 # Numbers of a homography, and of one with parallax.
 _MATRICES = (9, 12)
 
@@ -39,6 +41,11 @@ class SensorConfig(Section):
         0.0,
         1.0,
         open_low=True,
+    )
+    kind: str | None = choice(
+        None,
+        KINDS,
+        "what it is; an event camera sees nothing that stands, so its silence there says little",
     )
     score_weight: float = number(
         1.0, "1", "weight of its scores as evidence for or against an object; 0: none", 0.0, 10.0

@@ -173,6 +173,7 @@ inline constexpr double kLongestAgoS = 1000000000.0;
     JEAT_PAIR(unseen_bounds) \
     JEAT_ONE(stationary_speed) \
     JEAT_ONE(stationary_unseen_share) \
+    JEAT_ONE(event_stationary_unseen_share) \
     JEAT_PAIR(stationary_unseen_bounds) \
     JEAT_ONE(shared_false) \
     JEAT_ONE(noise_share) \

@@ -2,19 +2,19 @@
 
 Beside `NAME.onnx` it is `NAME.tracking.yaml`, with the section `sensor` (keys as of `sensors.NAME` in a
 configuration: `rate_hz`, `even_score`). Of a foreign network of pictures without such a file, the layout of
-its outputs tells what its scores mean (`even_score` of `models.layouts`).
+its outputs tells what its scores mean (`even_score` of `models.layouts`). What the sensor is (`kind`) tells
+what it is read from: pictures or events.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 from jeat_graph.config.section_tree import build, read_tree
-from jeat_graph.config.sensors import SensorConfig
+from jeat_graph.config.sensors import CAMERA, EVENT, OTHER, SensorConfig
 from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR, FUSED_SENSOR
 from jeat_graph.detection.models.engine import open_engine
@@ -23,10 +23,12 @@ from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.detection.models.recognising import layout_of, network_of, recognised
 from jeat_graph.detection.named import EVENTS, FRAMES, FUSED, MOTION, network_file
 from jeat_graph.detection.request import DetectRequest
-from jeat_graph.io.tables.sensor_columns import Declared
+from jeat_graph.io.tables.sensor_columns import Declared, as_settings
 
 _SUFFIX = ".tracking.yaml"
 _KINDS = {FRAMES_SENSOR: FRAMES, EVENTS_SENSOR: EVENTS, FUSED_SENSOR: FUSED}
+#: What a sensor is, by what its detector reads.
+_SENSOR_KINDS = {FRAMES: CAMERA, EVENTS: EVENT, FUSED: OTHER}
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class _Declared:
 def known_of(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> Declared:
     """Return what is known of the networks that detect, as settings of the tracker by sensor and key.
 
-    Detectors without weights say nothing.
+    Of pictures in which what moves is found without weights nothing is known: not what stands, either.
 
     Args:
         request: what detects.
@@ -58,17 +60,7 @@ def known_of(request: DetectRequest, say: Callable[[str], object] = lambda _: No
 
 def declared_settings(request: DetectRequest, say: Callable[[str], object] = lambda _: None) -> list[str]:
     """Return the same as `key=value` texts; args and errors as of `known_of`."""
-    return [f"sensors.{sensor}={json.dumps(keys)}" for sensor, keys in known_of(request, say).items()]
-
-
-def declared_of(
-    detectors: Mapping[str, str],
-    say: Callable[[str], object] = lambda _: None,
-    reading: ModelSettings | None = None,
-) -> list[str]:
-    """Return the same of detectors whose boxes come from elsewhere; args and errors as of the next."""
-    known = known_of_networks(detectors, say, reading)
-    return [f"sensors.{sensor}={json.dumps(keys)}" for sensor, keys in known.items()]
+    return as_settings(known_of(request, say))
 
 
 def known_of_networks(
@@ -89,20 +81,22 @@ def known_of_networks(
     found: Declared = {}
     for sensor, detector in detectors.items():
         if detector == MOTION:
+            found |= {sensor: {"kind": EVENT}} if _KINDS[sensor] == EVENTS else {}
             continue
+        found[sensor] = {"kind": _SENSOR_KINDS[_KINDS[sensor]]}
         network = network_file(detector, _KINDS[sensor])
         beside = network.with_name(network.name.removesuffix(network.suffix) + _SUFFIX)
         if not beside.is_file():
             if _KINDS[sensor] == FRAMES:
                 even = _even_by_layout(sensor, network, reading or ModelSettings(), say)
-                found |= {} if even is None else {sensor: {"even_score": even}}
+                found[sensor] |= {} if even is None else {"even_score": even}
             continue
         tree = read_tree(str(beside), (), str, "file of what a network's boxes are like")
         try:
             build(_Declared, tree, "")
         except ConfigError as error:
             raise ConfigError(f"{beside}: {error}") from None
-        found[sensor] = dict(tree.get("sensor") or {})
+        found[sensor] |= tree.get("sensor") or {}
         say(f"sensor {sensor!r}: its boxes are taken for what {beside.name} says (any other --config: not)")
     return found
 

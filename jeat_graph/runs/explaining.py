@@ -15,7 +15,7 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError
 from jeat_graph.runs.measured import complete_record, recorded_inputs
-from jeat_graph.tracking.hypotheses import Hypotheses
+from jeat_graph.tracking.hypotheses import Hypotheses, SensorEffect
 from jeat_graph.tracking.tracker import Tracker
 
 #: Boxes and tracks count as being at a time within so much of it (s).
@@ -33,6 +33,7 @@ class TrackMoment(NamedTuple):
         reported: whether the causal table has the track.
         visible: probability that it is there and not hidden.
         unseen_s: time since the last detection that confirmed it (s).
+        effects: what is known of each sensor did to it; of the last moment of a track alone.
     """
 
     t: float
@@ -42,6 +43,7 @@ class TrackMoment(NamedTuple):
     reported: bool
     visible: float
     unseen_s: float
+    effects: tuple[SensorEffect, ...] = ()
 
     @property
     def existence(self) -> float:
@@ -112,12 +114,17 @@ def explain_tracks(
         ConfigError: the configuration's engine has no hypotheses.
     """
     wanted, out = np.array(sorted(track_ids), dtype=np.int64), dict[int, list[TrackMoment]]()
+    last: dict[int, tuple[Hypotheses, int]] = {}
     for step in _steps(config, detections):
         rows = np.flatnonzero(np.isin(step.found.track_id, wanted))
         for row in rows.tolist():
-            out.setdefault(int(step.found.track_id[row]), []).append(_moment(step, row))
+            track_id = int(step.found.track_id[row])
+            out.setdefault(track_id, []).append(_moment(step, row))
+            last[track_id] = step.found, row
         if not len(rows) and len(out) == len(wanted):
             break
+    for track_id, (found, row) in last.items():
+        out[track_id][-1] = out[track_id][-1]._replace(effects=tuple(found.effects(row)))
     return out
 
 

@@ -49,7 +49,7 @@ class CoreModel(OneModel):
 
     def declare_sensor(self, name: str, declared: SensorConfig) -> None:
         """Add a sensor that has had no scan yet."""
-        self._model.declare_sensor(*given_of(declared))
+        self._model.declare_sensor(*given_of(declared, self.constants))
 
     def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time."""
@@ -153,6 +153,7 @@ class CoreModel(OneModel):
                 agreed_std=column["agreed_std"],
                 agreed_share=column["agreed_share"],
                 score_weight=column["score_weight"],
+                stationary_prior=column["stationary_prior"],
                 noise_share=float(column["noise_share"]),
             ),
             log_own_variance=column["log_own_variance"],

@@ -12,8 +12,31 @@ from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.filters import box_sides, singer
 from jeat_graph.filters.evidence import Evidence
 from jeat_graph.filters.model_constants import ModelConstants
-from jeat_graph.filters.object_probability import LogOddsTerms, SensorBelief, log_odds_terms
+from jeat_graph.filters.object_probability import (
+    LogOddsTerms,
+    SensorBelief,
+    log_odds_terms,
+    sensor_effects,
+)
 from jeat_graph.filters.visibility import VISIBLE
+
+
+class SensorEffect(NamedTuple):
+    """What is known of a sensor did to a track.
+
+    Attributes:
+        sensor: its name.
+        stood: by how much it changed the log odds that it may not see what stands.
+        scores: by how much the weight of its scores did, given or because others contradict them.
+        exactness: what a box of it counts of one of the most exact sensor: their variances' ratio.
+        most_exact: the name of that one.
+    """
+
+    sensor: str
+    stood: float
+    scores: float
+    exactness: float
+    most_exact: str
 
 
 class Hypotheses(NamedTuple):
@@ -29,6 +52,10 @@ class Hypotheses(NamedTuple):
         unseen_s: (N,) time since the last detection that confirmed it (s).
         detections: (N,) number of its detections.
         reported: (N,) whether the tables have it.
+        side_std: (S,) standard deviation of a sensor's sides, as the filter takes it (sizes).
+        evidence: what the log odds rest on.
+        belief: what is believed of the sensors.
+        constants: of the model.
     """
 
     sensors: tuple[str, ...]
@@ -40,11 +67,32 @@ class Hypotheses(NamedTuple):
     unseen_s: FloatArray
     detections: FloatArray
     reported: BoolArray
+    side_std: FloatArray
+    evidence: Evidence
+    belief: SensorBelief
+    constants: ModelConstants
+
+    def effects(self, row: int) -> list[SensorEffect]:
+        """Return what is known of each sensor did to one track: to its log odds, and to its place."""
+        one = self.evidence.take(np.array([row]))
+        stood, scores = sensor_effects(one, self.belief, self.constants)
+        most_exact = int(np.argmin(self.side_std))
+        return [
+            SensorEffect(
+                name,
+                float(stood[0, k]),
+                float(scores[0, k]),
+                float((self.side_std[most_exact] / self.side_std[k]) ** 2),
+                self.sensors[most_exact],
+            )
+            for k, name in enumerate(self.sensors)
+        ]
 
 
 def hypotheses_of(
     columns: Mapping[str, Any],
     belief: SensorBelief,
+    side_std: FloatArray,
     constants: ModelConstants,
     t: float,
     shown: IntArray,
@@ -55,6 +103,7 @@ def hypotheses_of(
     Args:
         columns: of the living tracks, by name, as the model's `tracks` returns them.
         belief: what is believed of the sensors.
+        side_std: (S,) of their boxes' sides (sizes).
         constants: of the model.
         t: time of the last step (s).
         shown: (R,) identities of the tracks that are reported.
@@ -81,4 +130,8 @@ def hypotheses_of(
         unseen_s=t - evidence.confirmed_s,
         detections=evidence.detections,
         reported=np.isin(track_id, shown),
+        side_std=side_std,
+        evidence=evidence,
+        belief=belief,
+        constants=constants,
     )

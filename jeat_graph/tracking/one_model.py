@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jeat_graph.config.schema import Config
-from jeat_graph.config.sensors import SensorConfig
+from jeat_graph.config.sensors import EVENT, SensorConfig
 from jeat_graph.data.arrays import FloatArray, IntArray, RecordArray
 from jeat_graph.filters import singer
 from jeat_graph.filters.model_constants import ModelConstants
@@ -65,15 +65,18 @@ def row_output(c: ModelConstants) -> RowOutput:
     return RowOutput(partial(singer.reported_motion, c=c), partial(singer.reported_covariance, c=c))
 
 
-def given_of(declared: SensorConfig) -> tuple[float, float, float]:
+def given_of(declared: SensorConfig, constants: ModelConstants) -> tuple[float, float, float, float]:
     """Return what a user says of a sensor, as engines take it.
 
     The logit of the score at which a box is as likely real as not, NaN where it is to be learnt; the weight
-    of its scores; the variance of its lasting error (sizes²), NaN where it is to be learnt.
+    of its scores; the variance of its lasting error (sizes²), NaN where it is to be learnt; the prior share
+    of objects that it does not see while they stand, by what it is.
     """
     even = math.nan if declared.even_score is None else float(logit(np.array(declared.even_score)))
     lasting = math.nan if declared.lasting_error is None else declared.lasting_error**2
-    return even, declared.score_weight, lasting
+    is_event = declared.kind == EVENT
+    blind = constants.event_stationary_unseen_share if is_event else constants.stationary_unseen_share
+    return even, declared.score_weight, lasting, blind
 
 
 class OneModel(SmoothsRecords):
@@ -158,4 +161,6 @@ class OneModel(SmoothsRecords):
 
     def hypotheses(self, t: float, shown: IntArray, sensors: tuple[str, ...]) -> Hypotheses:
         """Return what the living tracks are taken for, and why; see `TrackEngine.hypotheses`."""
-        return hypotheses_of(self.tracks(), self.learnt().belief, self.constants, t, shown, sensors)
+        learnt = self.learnt()
+        side_std = np.exp(0.5 * learnt.log_side_variance)
+        return hypotheses_of(self.tracks(), learnt.belief, side_std, self.constants, t, shown, sensors)

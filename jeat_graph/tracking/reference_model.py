@@ -71,7 +71,7 @@ class ReferenceModel(OneModel):
 
     def declare_sensor(self, name: str, declared: SensorConfig) -> None:
         """Add a sensor that has had no scan yet."""
-        declare_sensor(self._state, self.constants, *given_of(declared))
+        declare_sensor(self._state, self.constants, *given_of(declared, self.constants))
 
     def take(self, inputs: StepInput) -> None:
         """Take in the scans of one time."""

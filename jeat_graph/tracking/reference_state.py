@@ -280,7 +280,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         camera_velocity=CameraVelocity.none(),
         camera_path=CameraPath.none(),
         gaps=gap_survival.no_gaps(),
-        sensors=SensorBelief(none, none, none, none, none, none, none, none, none, c.noise_share),
+        sensors=SensorBelief(*[none] * (len(SensorBelief._fields) - 1), c.noise_share),
         ended=Evidence.none(0),
         learnt_s=-math.inf,
         offsets=sensor_offsets.no_offsets(),
@@ -305,10 +305,10 @@ def declare_sensor(
     even_logit: float = math.nan,
     score_weight: float = 1.0,
     lasting: float = math.nan,
+    stationary_prior: float | None = None,
 ) -> None:
     """Add a sensor without a scan yet, of which what is usual is believed but for what the user says."""
-    new, old = object_probability.initial_sensor(c), state.sensors
-    new = new._replace(score_weight=np.array([score_weight]))
+    new, old = object_probability.initial_sensor(c, score_weight, stationary_prior), state.sensors
     columns = (np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True))
     state.sensors = SensorBelief._make([*columns, old.noise_share])
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()

@@ -107,4 +107,4 @@ def test_a_table_says_how_many_unions_are_honest_about_their_positions():
     ]
     header, first, *_ = tables({"draws": draws})["unions"].render("csv").splitlines()
     shown = dict(zip(header.split(","), first.split(","), strict=True))
-    assert (float(shown["ANEES (median)"]), float(shown["ANEES .7 to 1.5 (%)"])) == (1.2, 50.0)
+    assert (float(shown["ANEES (median)"]), float(shown["ANEES 0.7 to 1.5 (%)"])) == (1.2, 50.0)

@@ -11,9 +11,10 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
-from jeat_graph.detection.declared import declared_of
+from jeat_graph.detection.declared import known_of_networks
 from jeat_graph.io.events.evt3_writer import Evt3Writer
 from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.sensor_columns import as_settings
 
 from ..detection.moving import SIZE, box_at, events_of, iou, picture_of
 
@@ -179,7 +180,7 @@ def test_track_takes_a_networks_boxes_for_what_is_known_of_them(tmp_path, raw, m
         assert main([*frames, "--out", str(tmp_path / name), *more]) == 0
         used[name] = json.loads((tmp_path / name / "run.json").read_text())["config"]["sensors"]["rgb"]
         assert ("sehn-frames.tracking.yaml" in capsys.readouterr().err) == (name != "paper")
-    known = load_config("default", declared_of({"rgb": "sehn"})).sensors["rgb"]
+    known = load_config("default", as_settings(known_of_networks({"rgb": "sehn"}))).sensors["rgb"]
     again = tmp_path / "again"
     assert (
         main(["track", str(tmp_path / "plain" / "detections.csv"), "--image", "320x200", "--out", str(again)])

@@ -119,3 +119,25 @@ def test_of_several_sensors_it_says_what_is_known_of_them(tmp_path, capsys):
     assert "(learnt from the other sensors)" in first
     assert "its scores count 0.5 times (as given)" in first
     assert not any(line.startswith("sensor ") for line in others)
+    [of_track] = [line for line in others if line.startswith("by what is known of two: ")]
+    assert "a box of it counts 0." in of_track
+    assert "of one of one" in of_track
+    assert "the weight of its scores, by -" in of_track
+
+
+def test_it_says_what_the_kind_of_a_sensor_did_to_a_parked_car(tmp_path, capsys):
+    rows = ["t,sensor,left,top,width,height,score"]
+    for k in range(2 * SCANS):
+        rows.append(f"{k / RATE_HZ},cam,{100 + 8 * k},300,80,50,0.9")
+        rows.append(f"{k / RATE_HZ},evt,{100 + 8 * k},300,80,50,0.9")
+        rows.append(f"{k / RATE_HZ},cam,900,200,40,60,0.6")
+    (tmp_path / "d.csv").write_text("\n".join(rows) + "\n")
+    kind = ["--set", "sensors.evt.kind=event", "--set", "sensors.cam.kind=camera"]
+    run = str(tmp_path / "run")
+    assert main(["track", str(tmp_path / "d.csv"), "--out", run, "--image", "1280x720", *kind]) == 0
+    text = explained(tmp_path, capsys, "--track", "2")
+    assert "sensor evt: an event camera (as given), " in text
+    assert "sensor cam: a camera (as given), " in text
+    [line] = [line for line in text.splitlines() if line.startswith("by what is known of evt: ")]
+    change = float(line.split("that it may not see what stands changed the log odds by ")[1].split(";")[0])
+    assert change > 0.5

@@ -10,7 +10,8 @@ import pytest
 
 from jeat_graph.cli.main import main
 from jeat_graph.config.reading import load_config
-from jeat_graph.detection.declared import declared_of
+from jeat_graph.detection.declared import known_of_networks
+from jeat_graph.io.tables.sensor_columns import as_settings
 
 BOTH = ("--detector-frames", "sehn", "--detector-events", "sehn")
 LINES = [f"{k * 0.05:.2f},{name},{100 + 2 * k},200,40,30,0.95" for k in range(30) for name in ("rgb", "evt")]
@@ -30,14 +31,14 @@ def test_a_file_of_boxes_is_tracked_as_what_is_known_of_its_networks_says(boxes,
     assert main(["track", boxes, "--out", out, *BOTH, "--set", "sensors.evt.even_score=0.7"]) == 0
     assert "sehn-frames.tracking.yaml" in capsys.readouterr().err
     found = of_run(tmp_path / "run")["sensors"]
-    known = load_config("default", declared_of({"rgb": "sehn", "evt": "sehn"})).sensors
+    known = load_config("default", as_settings(known_of_networks({"rgb": "sehn", "evt": "sehn"}))).sensors
     assert found["rgb"]["even_score"] == known["rgb"].even_score is not None
     assert found["evt"]["even_score"] == 0.7, "what the user sets counts over it"
 
 
 def test_boxes_from_a_pipe_are_taken_for_what_the_same_settings_say(boxes, monkeypatch, capsys):
     networks = {"rgb": "sehn", "evt": "sehn"}
-    by_hand = [word for setting in declared_of(networks) for word in ("--set", setting)]
+    by_hand = [word for setting in as_settings(known_of_networks(networks)) for word in ("--set", setting)]
     answers = []
     for told in (BOTH, by_hand, ()):
         with open(boxes, "rb") as file:

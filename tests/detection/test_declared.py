@@ -7,7 +7,7 @@ import pytest
 
 from jeat_graph.config.reading import load_config
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.detection.declared import declared_settings
+from jeat_graph.detection.declared import declared_settings, known_of
 from jeat_graph.detection.models.onnx_head import CARD
 from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import load_settings
@@ -20,22 +20,29 @@ def test_networks_of_the_package_say_what_their_scores_mean(network):
     sensors = load_config("default", declared_settings(asked, said.append)).sensors
     assert sensors.keys() == {"rgb", "evt"}
     assert all(0.2 < one.even_score < 0.6 for one in sensors.values())
+    assert (sensors["rgb"].kind, sensors["evt"].kind) == ("camera", "event")
     assert [line.split(":")[0] for line in said] == ["sensor 'rgb'", "sensor 'evt'"]
 
 
-def test_who_looks_at_nothing_or_has_no_weights_says_nothing():
-    assert declared_settings(DetectRequest(frames="a", events="b")) == []
-    only = declared_settings(DetectRequest(frames="a", events="b", detector_events="sehn"))
-    assert [line.split("=")[0] for line in only] == ["sensors.evt"]
+def test_what_is_read_tells_what_a_sensor_is_whatever_finds_things_in_it():
+    assert known_of(DetectRequest(frames="a")) == {}, "who finds what moves sees nothing that stands"
+    assert known_of(DetectRequest(events="b")) == {"evt": {"kind": "event"}}
+    only = known_of(DetectRequest(frames="a", events="b", detector_events="sehn"))
+    assert (only.keys(), only["evt"]["kind"]) == ({"evt"}, "event")
+    both = DetectRequest(frames="a", events="b", detector_fused="sehn")
+    assert known_of(both)["fused"]["kind"] == "other"
 
 
 def test_a_network_of_ones_own(tmp_path):
     network = tmp_path / "mine.onnx"
     request = DetectRequest(frames="a", detector_frames=str(network))
-    assert declared_settings(request) == []
+    assert known_of(request) == {"rgb": {"kind": "camera"}}
     beside = tmp_path / "mine.tracking.yaml"
     beside.write_text("sensor: {even_score: 0.7}\n", encoding="utf-8")
-    assert load_config("default", declared_settings(request)).sensors["rgb"].even_score == 0.7
+    told = load_config("default", declared_settings(request)).sensors["rgb"]
+    assert (told.even_score, told.kind) == (0.7, "camera")
+    beside.write_text("sensor: {kind: other}\n", encoding="utf-8")
+    assert known_of(request) == {"rgb": {"kind": "other"}}, "who made the network knows better"
     for wrong in ("sensor: {even_skore: 0.7}", "sensors: {}", "sensor: 3", "sensor: {even_score: 7}", "- 1"):
         beside.write_text(wrong + "\n", encoding="utf-8")
         with pytest.raises(ConfigError) as error:
@@ -71,7 +78,7 @@ def test_the_layout_of_a_foreign_network_says_what_its_scores_mean(tmp_path, out
     request = DetectRequest(frames="a", detector_frames=str(network))
     settings = declared_settings(request, said.append)
     if even is None:
-        assert (settings, said) == ([], [])
+        assert (settings, said) == (['sensors."rgb".kind="camera"'], [])
         return
     assert load_config("default", settings).sensors["rgb"].even_score == even
     assert f"score {even:g}" in said[0]

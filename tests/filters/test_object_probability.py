@@ -60,9 +60,10 @@ def sensors_of(
     stationary_unseen=0.3,
     agreed=0.0,
     weight=1.0,
+    prior=C.stationary_unseen_share,
 ):
     values = (p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, 3.0, 0.8, agreed, weight)
-    rows = [np.full(number, value) for value in values]
+    rows = [np.full(number, value) for value in (*values, prior)]
     return op.SensorBelief(*rows, noise_share=noise)
 
 
@@ -127,7 +128,7 @@ def enumerated(evidence, sensors):
 def weighed_by_hand(evidence, sensors, s):
     """Log odds by the scores of a sensor: what others contradict and is unlike agreed scores says little."""
     z, hits, misses = evidence.peak[0, s], evidence.hits[0], evidence.misses[0]
-    given = z - sensors.decision_threshold[s]
+    given = sensors.score_weight[s] * (z - sensors.decision_threshold[s])
     if given <= 0.0:
         return given
     alone, silent = 1.0, 0.0
@@ -265,6 +266,38 @@ def test_learning_finds_that_a_sensor_does_not_see_what_stands():
     naive = believed._replace(stationary_unseen=np.full(2, 0.02))
     told = [op.posterior(silent, one, C).log_odds[0] for one in (believed, naive)]
     assert told[0] - told[1] > 1.0
+
+
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("prior", [C.stationary_unseen_share, C.event_stationary_unseen_share])
+def test_what_a_sensor_is_counts_as_five_objects_that_it_does_not_see_while_they_stand(prior, number):
+    """With one that it surely sees while it stands, the share is the mean of a Beta posterior."""
+    hits = [30.0, 30.0][:number]
+    seen = evidence_of(hits, [0.0] * number, [2.5] * number, gained=20.0, stood=1.0)
+    believed = sensors_of(number, stationary_unseen=prior, prior=prior)
+    told = op.posterior(seen, believed, C)
+    assert told.stationary_unseen[0, 0] < 1e-6
+    learnt = op.learn_sensors(seen, believed, C).stationary_unseen[0]
+    real = told.real[0] * (1.0 - told.unseen[0, 0])
+    counts = prior if number > 1 else C.stationary_unseen_share
+    assert learnt == pytest.approx(C.sensor_count * counts / (C.sensor_count + real), rel=0.02)
+
+
+def test_what_is_known_of_a_sensor_changed_is_the_difference_of_two_posteriors():
+    """By the sum over every hypothesis: as it is, without what it may not see, with its scores in full."""
+    one = evidence_of([6.0, 1.0], [1.0, 7.0], [1.4, 2.0], gained=3.0, stood=0.8)
+    known = sensors_of(2, weight=0.4)
+    stood, scores = op.sensor_effects(one, known, C)
+    for s in range(2):
+        sees, full = known.stationary_unseen.copy(), known.score_weight.copy()
+        sees[s], full[s] = 1e-9, 1.0
+        others = known._replace(stationary_unseen=sees), known._replace(score_weight=full)
+        actual, without, weighed = (
+            np.log(p / (1.0 - p)) for p in (enumerated(one, k) for k in (known, *others))
+        )
+        np.testing.assert_allclose(
+            [stood[0, s], scores[0, s]], [actual - without, actual - weighed], atol=1e-6
+        )
 
 
 def test_learning_from_nothing_changes_nothing():

@@ -12,6 +12,7 @@ import pytest
 from live_tests import certificates, video
 
 from jeat_graph.cli.main import main
+from jeat_graph.config.reading import load_config
 from jeat_graph.data.scan import Scan
 from jeat_graph.live.service.status import Status
 
@@ -139,6 +140,22 @@ def test_two_channels_of_one_recorder_have_labels_of_their_own(tmp_path):
     assert [one["sensor"] for one in status.health()["cameras"]] == ["left", "right"]
     problems = status.problems()
     assert any(one.startswith("left (rtsp://127.0.0.1:1/road): not connected") for one in problems)
+
+
+def test_what_is_known_of_a_network_is_told_of_its_camera_by_the_name_that_it_has(tmp_path):
+    from contextlib import ExitStack
+
+    from jeat_graph.live.service.cameras import Cameras
+    from jeat_graph.live.service.config import read_service
+    from jeat_graph.live.service.log import Log
+
+    config, _ = read_service(written(tmp_path, GOOD.replace("detector: motion", "detector: sehn")))
+    with ExitStack() as stack:
+        cameras = Cameras(config, Status("gantry7", 10.0), Log("gantry7"), stack)
+        sensors = load_config("default", cameras.settings(Log("gantry7"))).sensors
+    assert sensors.keys() == {"left"}
+    assert sensors["left"].kind == "camera"
+    assert sensors["left"].even_score is not None
 
 
 def a_scan(t, sensor="rgb"):

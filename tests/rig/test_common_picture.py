@@ -153,6 +153,16 @@ def test_what_leaves_the_way_open_is_refused(settings: list[str], said: str) -> 
         Tracker(load_config(overrides=settings))
 
 
+def test_a_rig_may_say_what_its_sensors_are(rig: Path) -> None:
+    tree = yaml.safe_load(RIG)
+    for name, keys in tree["sensors"].items():
+        keys["kind"] = "event" if name == "evt" else "camera"
+    rig.write_text(yaml.safe_dump(tree))
+    kinds = {name: one.kind for name, one in load_config(rig=rig).sensors.items()}
+    assert kinds == {name: "event" if name == "evt" else "camera" for name in tree["sensors"]}
+    assert kinds["evt"] == "event"
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -164,6 +174,8 @@ def test_what_leaves_the_way_open_is_refused(settings: list[str], said: str) -> 
         ),
         ({"sensors": {"evt": {"to_picture": "none", "image": [6, 4]}}}, "none, but its picture has 6 x 4 px"),
         ({"sensors": {"evt": {"offset": 1}}}, "unknown key sensors.evt.offset"),
+        ({"sensors": {"evt": {"kind": "radar"}}}, "sensors.evt.kind: 'radar' is not one of event, camera"),
+        ({"sensors": {"evt": {"kind": [1]}}}, "sensors.evt.kind: "),
     ],
 )
 def test_a_rig_that_says_something_else_is_refused(rig: Path, change: dict, said: str) -> None:

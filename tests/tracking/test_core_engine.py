@@ -95,8 +95,8 @@ def drawn_std(rng, sides):
     return np.where(rng.random(size.shape) < 0.15, np.nan, found)
 
 
-def declare(model):
-    model.declare_sensor("any", SensorConfig())
+def declare(model, kind=None):
+    model.declare_sensor("any", SensorConfig(kind=kind))
 
 
 def assert_alike(one, other, what, atol=_RELATIVE):
@@ -119,9 +119,10 @@ def assert_alike(one, other, what, atol=_RELATIVE):
 def test_every_step_is_the_references(seed, sensors, known, motions, spreads):
     core, reference = models("engine=none", known)
     rng = np.random.default_rng(seed)
-    for _ in range(sensors):
-        declare(core)
-        declare(reference)
+    for number in range(sensors):
+        kind = (None, "event", "camera", "other")[(seed + number) % 4]
+        declare(core, kind)
+        declare(reference, kind)
     for k, scans in enumerate(drawn_stream(seed, sensors, 25, motions)):
         inputs = looked(*scans, box_std=drawn_std(rng, scans[3]) if spreads else None)
         core.take(inputs)

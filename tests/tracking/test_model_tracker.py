@@ -228,7 +228,7 @@ def test_the_score_at_which_a_box_is_as_likely_real_as_not_is_believed(engine):
     assert born[".95"] < born[".2"]
 
 
-@pytest.mark.parametrize("said", ["kind: event", "even_score: 0", "even_score: 2", "even_score: high"])
+@pytest.mark.parametrize("said", ["kind: radar", "even_score: 0", "even_score: 2", "even_score: high"])
 def test_what_cannot_be_said_of_a_sensor_is_refused(said):
     with pytest.raises(ConfigError, match=said.split(":")[0]):
         load_config("default", [f"sensors.cam={{rate_hz: 20, {said}}}"])
@@ -275,6 +275,42 @@ def test_that_an_event_camera_sees_nothing_that_stands_is_learnt():
     assert blind[0] < 1e-6
     assert reported["learnt"] > 0.85
     assert reported["learnt"] > reported["not"] + 0.03
+
+
+def parked(seed, seconds=4.0):
+    """A vehicle that a camera finds at its place one look in three, an event camera never; one passes."""
+    rng = np.random.default_rng(seed)
+    times = sorted(
+        [(k / 100, "evt") for k in range(int(100 * seconds))]
+        + [(k / 20 + 0.003, "rgb") for k in range(int(20 * seconds))]
+    )
+    for t, sensor in times:
+        there = np.array([[600.0, 300.0], [100.0 + 150.0 * t, 500.0]])
+        found = rng.random(2) < ([0.35, 0.7] if sensor == "rgb" else [0.0, 0.9])
+        boxes = np.column_stack([there, np.full((2, 2), 40.0)])[found] + rng.normal(0, 0.8, (found.sum(), 4))
+        yield t, sensor, boxes, rng.uniform(0.45, 0.65, len(boxes))
+
+
+def parked_odds(kind):
+    """Log odds of the parked vehicle at the end, and what is believed of the event camera by then."""
+    odds = []
+    for seed in range(4):
+        told = {} if kind is None else {"evt": {"kind": kind}}
+        settings = [f"sensors.{name}={keys}" for name, keys in told.items()]
+        tracker = ModelTracker(load_config("default", [*settings, "smoother.engine=none"]), image=(1280, 720))
+        for scan in parked(seed):
+            tracker.step(scan)
+        found = tracker.hypotheses()
+        at = np.abs(found.boxes[:, :2] - [600.0, 300.0]).max(axis=1) < 20.0
+        odds.append(found.log_odds[at].max())
+    return np.array(odds)
+
+
+def test_the_silence_of_what_is_told_to_be_an_event_camera_says_little_about_what_stands():
+    usual, event = parked_odds(None), parked_odds("event")
+    assert (event > usual + 0.4).all()
+    for kind in ("camera", "other"):  # nothing was measured to be better of them than what is usual
+        np.testing.assert_array_equal(parked_odds(kind), usual)
 
 
 # What a detector returns.

@@ -222,6 +222,7 @@ FORGED = {
     "accuracy.pairs": [-1.0],
     "accuracy.lasting": [-1.0, np.inf],
     "belief.score_weight": [-1.0, np.inf],
+    "belief.stationary_prior": [-0.1, 1.5],
     "sensor0.given_lasting": [-1.0, 4.0],
     "sensor0.mean_spread": [-1.0, 0.0, np.inf],
     "tracks.apart": [1e9],

@@ -13,10 +13,11 @@ namespace jeat::filters {
 
 struct SensorBelief {
     std::vector<double> p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std,
-        agreed_share, score_weight;
+        agreed_share, score_weight, stationary_prior;
     double noise_share;
 
-    void widen(const ModelConstants& c) {
+    // Add a sensor: the weight of its scores, and the prior of what it does not see while it stands.
+    void widen(const ModelConstants& c, double weight, double stationary) {
         p_detect.push_back(c.p_detect);
         unseen.push_back(c.unseen_share);
         stationary_unseen.push_back(c.stationary_unseen_share);
@@ -25,7 +26,8 @@ struct SensorBelief {
         agreed_mean.push_back(0.0);
         agreed_std.push_back(c.agreed_std);
         agreed_share.push_back(0.0);
-        score_weight.push_back(1.0);
+        score_weight.push_back(weight);
+        stationary_prior.push_back(stationary);
     }
 };
 
@@ -226,14 +228,17 @@ inline void learn_sensors(const Evidence& ended, const Evidence& living, SensorB
         sums.add(ended, rule, c);
         sums.add(living, rule, c);
         SensorBelief next = sensors;
+        // Of a sensor alone the prior is the usual one: what it may not see is about what the others see.
+        const bool alone = sensors.p_detect.size() == 1;
         for (std::size_t s = 0; s < sensors.p_detect.size(); ++s) {
+            const double stationary_prior = alone ? c.stationary_unseen_share : sensors.stationary_prior[s];
             next.p_detect[s] = clamp(beta_share(sums.hits[s], sums.scans[s], c.p_detect, c.p_detect_count),
                                      c.p_detect_bounds.low, c.p_detect_bounds.high);
             next.unseen[s] = clamp(beta_share(sums.unseen[s], sums.seeable[s], c.unseen_share, c.sensor_count),
                                    c.unseen_bounds.low, c.unseen_bounds.high);
-            next.stationary_unseen[s] = clamp(
-                beta_share(sums.stationary_unseen[s], sums.stationary[s], c.stationary_unseen_share, c.sensor_count),
-                c.stationary_unseen_bounds.low, c.stationary_unseen_bounds.high);
+            next.stationary_unseen[s] =
+                clamp(beta_share(sums.stationary_unseen[s], sums.stationary[s], stationary_prior, c.sensor_count),
+                      c.stationary_unseen_bounds.low, c.stationary_unseen_bounds.high);
             if (const double known = sums.agreed[s]; known > 0.0) {
                 const double mean = sums.agreed_score[s] / known, count = c.sensor_count;
                 const double squares = std::max(sums.agreed_square[s] - known * mean * mean, 0.0);

@@ -130,8 +130,10 @@ public:
 
     Exclusive use;
 
-    void declare_sensor(double even_logit, double score_weight, double lasting) {
-        now_.state.declare_sensor(even_logit, score_weight, lasting);
+    void declare_sensor(double even_logit, double score_weight, double lasting,
+                        std::optional<double> stationary_prior) {
+        now_.state.declare_sensor(even_logit, score_weight, lasting,
+                                  stationary_prior.value_or(now_.state.constants.stationary_unseen_share));
     }
 
     void take(double t, In<std::int64_t> sensors, In<std::int64_t> numbers, In2<double> boxes, In<double> logits,
@@ -336,6 +338,7 @@ public:
         out["agreed_std"] = array_of(state.belief.agreed_std);
         out["agreed_share"] = array_of(state.belief.agreed_share);
         out["score_weight"] = array_of(state.belief.score_weight);
+        out["stationary_prior"] = array_of(state.belief.stationary_prior);
         out["decision_threshold"] = array_of(state.belief.decision_threshold);
         out["prior_odds"] = array_of(state.belief.prior_odds);
         std::vector<double> leftovers;
@@ -478,10 +481,11 @@ void bind(nb::module_& module) {
         .def(
             "declare_sensor", exclusive(&Model::declare_sensor),
             nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(), nb::arg("score_weight") = 1.0,
-            nb::arg("lasting") = std::numeric_limits<double>::quiet_NaN(),
+            nb::arg("lasting") = std::numeric_limits<double>::quiet_NaN(), nb::arg("stationary_prior") = nb::none(),
             "Add a sensor that has had no scan yet. even_logit: of the score at which a box is as likely real as not,\n"
             "NaN where it is to be learnt; score_weight: of its scores as evidence; lasting: variance of what lasts of\n"
-            "its errors (sizes²), NaN where it is to be learnt.")
+            "its errors (sizes²), NaN where it is to be learnt; stationary_prior: share of objects that it does not see while\n"
+            "they stand, by what the sensor is.")
         .def(
             "take", exclusive(&Model::take), nb::arg("t"), nb::arg("sensors").noconvert(),
             nb::arg("numbers").noconvert(), nb::arg("boxes").noconvert(), nb::arg("logits").noconvert(),

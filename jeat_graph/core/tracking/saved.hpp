@@ -207,11 +207,12 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     v.numbers("gaps.ended", gaps_ended.data(), gaps_ended.size());
     v.numbers("gaps.ended_well", ended_well.data(), ended_well.size());
     auto& [p_detect, unseen, stationary_unseen, decision_threshold, prior_odds, agreed_mean, agreed_std, agreed_share,
-           score_weight, noise_share] = belief;
+           score_weight, stationary_prior, noise_share] = belief;
     v.column("belief.agreed_mean", agreed_mean, S, 1);
     v.column("belief.agreed_std", agreed_std, S, 1);
     v.column("belief.agreed_share", agreed_share, S, 1);
     v.column("belief.score_weight", score_weight, S, 1);
+    v.column("belief.stationary_prior", stationary_prior, S, 1);
     v.column("belief.p_detect", p_detect, S, 1);
     v.column("belief.unseen", unseen, S, 1);
     v.column("belief.stationary_unseen", stationary_unseen, S, 1);

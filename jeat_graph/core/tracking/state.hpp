@@ -166,8 +166,8 @@ struct State {
         return picture_known && at >= beyond;
     }
 
-    void declare_sensor(double even_logit, double score_weight, double given_lasting) {
-        belief.widen(constants);
+    void declare_sensor(double even_logit, double score_weight, double given_lasting, double stationary_prior) {
+        belief.widen(constants, score_weight, stationary_prior);
         tracks.widen();
         ended.widen();
         offsets.widen();
@@ -176,7 +176,6 @@ struct State {
         sensor.leftovers = sensor.false_boxes = constants.first_leftovers;
         sensor.even_logit = even_logit;
         sensor.given_lasting = given_lasting;
-        belief.score_weight.back() = score_weight;
         accuracy.widen(std::isnan(given_lasting) ? 0.0 : given_lasting);
         sensors.push_back(std::move(sensor));
     }

@@ -205,6 +205,7 @@ inline void check_belief(const State& state) {
     for (std::size_t k = 0; k < state.gaps.ended.size(); ++k)
         check_between("gaps.ended_well", state.gaps.ended_well[k], 0.0, state.gaps.ended[k]);
     check_between("belief.score_weight", belief.score_weight, 0.0, kMostLogVariance);
+    check_between("belief.stationary_prior", belief.stationary_prior, 0.0, 1.0);
     check_accuracy(state.accuracy);
     const OffsetSums& offsets = state.offsets;
     check_counts("offsets.weight", offsets.weight);

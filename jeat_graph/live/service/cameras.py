@@ -9,13 +9,15 @@ from dataclasses import replace
 
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import ConfigError
-from jeat_graph.detection.declared import declared_settings
+from jeat_graph.detection.declared import known_of
+from jeat_graph.detection.detecting import EVENTS_SENSOR, FRAMES_SENSOR
 from jeat_graph.detection.live_detecting import LiveDetecting
 from jeat_graph.detection.masks import read_masks
 from jeat_graph.detection.named import AUTO, MOTION
 from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import load_settings
 from jeat_graph.io.capture.wall_clock import WallClock
+from jeat_graph.io.tables.sensor_columns import as_settings
 from jeat_graph.live.service.config import ServiceConfig, SourceConfig, full_url, sensor_of
 from jeat_graph.live.service.log import Log
 from jeat_graph.live.service.status import Status
@@ -84,12 +86,9 @@ class Cameras:
         """Return what is declared to the tracker's configuration of the detectors, as `key=value`."""
         found = []
         for camera, sensor in self._opened:
-            for text in declared_settings(camera.request, log.say):
-                own = "rgb" if camera.request.frames is not None else "evt"
-                there = f"sensors.{own}."
-                found.append(
-                    text.replace(there, f"sensors.{sensor or own}.", 1) if text.startswith(there) else text
-                )
+            own = FRAMES_SENSOR if camera.request.frames is not None else EVENTS_SENSOR
+            known = known_of(camera.request, log.say)
+            found += as_settings({sensor or own if name == own else name: k for name, k in known.items()})
         return found
 
     def take(self, timeout_s: float) -> Scan | None:
