@@ -31,7 +31,7 @@ def link_cosines(
         own = np.where((sensor == one)[:, None], embeddings, np.nan)
         both = centred(np.concatenate([_means(own, last), _means(own, first)]))
         found.append(np.einsum("le,le->l", both[links.tail], both[len(last) + links.head]))
-    return np.array(found).reshape(-1, len(links.tail))
+    return np.array(found).reshape(len(found), len(links.tail))
 
 
 def learnt_likeness(cosine: FloatArray, probability: FloatArray) -> FloatArray:
