@@ -75,6 +75,12 @@ class SensorBelief(NamedTuple):
     stationary_prior: FloatArray
     noise_share: float
 
+    @staticmethod
+    def of_none(noise_share: float) -> SensorBelief:
+        """Return what is believed before there is any sensor."""
+        none = np.zeros(0)
+        return SensorBelief(none, none, none, none, none, none, none, none, none, none, noise_share)
+
 
 class LogOddsTerms(NamedTuple):
     """Why tracks are taken for what they are: terms whose sum is the log odds of being real.

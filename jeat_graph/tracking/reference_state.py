@@ -280,7 +280,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         camera_velocity=CameraVelocity.none(),
         camera_path=CameraPath.none(),
         gaps=gap_survival.no_gaps(),
-        sensors=SensorBelief(*[none] * (len(SensorBelief._fields) - 1), c.noise_share),
+        sensors=SensorBelief.of_none(c.noise_share),
         ended=Evidence.none(0),
         learnt_s=-math.inf,
         offsets=sensor_offsets.no_offsets(),
