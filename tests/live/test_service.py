@@ -413,20 +413,22 @@ def test_a_checkpoint_of_another_version_is_refused_or_set_aside(tmp_path, monke
 
 
 def test_smoothed_rows_of_a_run_that_is_not_gone_on_from_are_set_aside(tmp_path, capsys):
+    from jeat_graph import Tracker, load_config
+    from jeat_graph.live.late import LiveTracker
     from jeat_graph.live.service.config import read_service
     from jeat_graph.live.service.log import Log
     from jeat_graph.live.service.run import Service
 
     path, rows = tmp_path / "service.yaml", tmp_path / "smoothed.csv"
     path.write_text(UNREACHED)
-    service = Service(read_service(path)[0], Log("x"))
+    service, live = Service(read_service(path)[0], Log("x")), LiveTracker(Tracker(load_config("default")))
     rows.write_text(csv_header(False))
-    with service._smoothed_file(str(rows), None):
+    with service._smoothed_file(str(rows), None, live):
         pass  # without rows it is no loss
     content = csv_header(False) + "0.0,1\n"
     for keep_bytes in (None, 10_000):  # no checkpoint; one of a longer file
         rows.write_text(content)
-        with service._smoothed_file(str(rows), keep_bytes):
+        with service._smoothed_file(str(rows), keep_bytes, live):
             pass
         assert rows.read_text() == csv_header(False)
     assert [(tmp_path / f"smoothed.csv.earlier-{k}").read_text() for k in (1, 2)] == [content] * 2
