@@ -140,10 +140,11 @@ def test_instants_are_grouped_by_the_sensors_that_saw_the_track_and_by_distance(
 def expected_by_class(tracks, truth, rows, labels):
     """Count, RMSE and ANEES of [p, v, a] of filter and smoother by class, object by object in plain loops."""
     errors = {}
+    estimates = [{"filter": (one.mean, one.covariance), "full": one.smoothed()} for one in tracks]
     for row in rows:
-        one, label = (some[truth.object_id[row] - 1] for some in (tracks, labels))
+        one, label, of = (some[truth.object_id[row] - 1] for some in (tracks, labels, estimates))
         k = int(np.flatnonzero(one.t == truth.t[row])[0])
-        for name, (mean, cov) in {"filter": (one.mean, one.covariance), "full": one.smoothed()}.items():
+        for name, (mean, cov) in of.items():
             error = mean[k] - truth.motion[row].reshape(3, 2).T
             spread = [[cov[k, axis, part, part] for part in range(3)] for axis in range(2)]
             errors.setdefault((label, name), []).append((error**2, error**2 / spread))

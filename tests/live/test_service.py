@@ -436,7 +436,7 @@ def test_smoothed_rows_of_a_run_that_is_not_gone_on_from_are_set_aside(tmp_path,
     assert f"{rows}: is of a run that is not continued; it is {rows}.earlier-1 now" in first
     assert f"and had 10000 when the checkpoint was written; it is {rows}.earlier-2 now" in second
     rows.write_text(content)
-    with service._smoothed_file(str(rows), 0):
+    with service._smoothed_file(str(rows), 0, live):
         pass  # the checkpoint is from before the first row, and all come again
     assert rows.read_text() == csv_header(False)
     assert not (tmp_path / "smoothed.csv.earlier-3").exists()
