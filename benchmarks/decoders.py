@@ -35,7 +35,7 @@ SHAPES = {
     "sparse": StreamShape(rate_hz=1e5, in_runs=0.0, run_px=1.0),
     "dense": StreamShape(rate_hz=2e7, in_runs=0.9, run_px=12.0),
 }
-#: Freed memory stays with the process: else the first format pays for pages that the kernel clears anew.
+#: The allocator keeps freed memory: otherwise the first format measured also pays for page faults.
 _KEEPS_MEMORY = dict.fromkeys(("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"), str(1 << 32))
 _SIZE, _TURNS, _REPEATS = (1280, 720), 3, 3
 

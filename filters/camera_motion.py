@@ -137,6 +137,11 @@ def contradicted(
     return without >= _LEAST_WITNESSES and 10 * paired < _LEAST_TENTHS * without
 
 
+def lasting_rate(dt: float, c: ModelConstants) -> float:
+    """Return the share per second of a motion of `dt` (s), > 0, that goes over to the tracks' velocities."""
+    return (1.0 - math.exp(-dt / c.camera_time_s)) / dt
+
+
 def compensate(
     mean: FloatArray,
     covariance: FloatArray,
@@ -160,7 +165,7 @@ def compensate(
         c: constants.
     """
     shift, scale = motion.theta[:2], motion.theta[2]
-    lasting = (1.0 - math.exp(-dt / c.camera_time_s)) / dt
+    lasting = lasting_rate(dt, c)
     mean, covariance = mean.copy(), covariance.copy()
     moved = shift + scale * (mean[:, :, POSITION] - np.array(picture) / 2.0)
     mean[:, :, POSITION] += moved

@@ -8,13 +8,12 @@ all tracks have in common, and by what lasts of that, which is part of the track
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.filters.camera_motion import CameraMotion
+from jeat_graph.filters.camera_motion import CameraMotion, lasting_rate
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.filters.picture_motion import CameraVelocity, displacement
 from jeat_graph.filters.singer import POSITION, VELOCITY
@@ -72,9 +71,8 @@ class CameraPath(NamedTuple):
             dt: the time that it took (s), > 0.
             c: constants.
         """
-        lasting = (1.0 - math.exp(-dt / c.camera_time_s)) / dt
         shift = motion.theta[:2]
-        return CameraPath(self.moved + shift, self.velocity + lasting * shift)
+        return CameraPath(self.moved + shift, self.velocity + lasting_rate(dt, c) * shift)
 
 
 def _rate(camera: CameraVelocity, picture: tuple[float, float]) -> FloatArray:

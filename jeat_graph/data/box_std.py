@@ -1,8 +1,8 @@
 """How sure a detector is of each side of a box: standard deviations in px, as the detector gives them.
 
 They come from networks whose regression of a box has a spread (a distribution of each side, a variance head).
-Not all have them, so a side of which nothing is known is NaN. The tracker learns for each sensor by which
-factor they are too small or too large (`filters.box_spread`).
+Not all have them: an unknown standard deviation is NaN. The tracker learns, for each sensor, the factor by
+which they are too small or too large (`filters.box_spread`).
 """
 
 from __future__ import annotations

@@ -79,11 +79,11 @@ def models(smoother, known, **changes):
     return [make(ModelConstants(**changes), config) for make in (CoreModel, ReferenceModel)]
 
 
-def looked(t, sensors, numbers, sides, logits, alike=None, motion=None, box_std=None):
+def step_input(t, sensors, numbers, sides, logits, similarity=None, motion=None, box_std=None):
     """Return a drawn scan as engines take it."""
     boxes = np.concatenate([sides[:, :2], sides[:, 2:] - sides[:, :2]], axis=1)
     scores = 1.0 / (1.0 + np.exp(-logits))
-    return StepInput(t, sensors, numbers, boxes, scores, alike, motion, box_std=box_std)
+    return StepInput(t, sensors, numbers, boxes, scores, similarity, motion, box_std=box_std)
 
 
 def drawn_std(rng, sides):
@@ -124,7 +124,7 @@ def test_every_step_is_the_references(seed, sensors, known, motions, spreads):
         declare(core, kind)
         declare(reference, kind)
     for k, scans in enumerate(drawn_stream(seed, sensors, 25, motions)):
-        inputs = looked(*scans, box_std=drawn_std(rng, scans[3]) if spreads else None)
+        inputs = step_input(*scans, box_std=drawn_std(rng, scans[3]) if spreads else None)
         core.take(inputs)
         core.hand_over()
         reference.take(inputs)
@@ -149,7 +149,7 @@ def test_whole_tracks_are_smoothed_as_by_the_reference(seed, motions):
         declare(model)
         declare(model)
         for scans in drawn_stream(seed, 2, 40, motions):
-            model.take(looked(*scans))
+            model.take(step_input(*scans))
             model.hand_over()
     ours, theirs = sorted_rows(core.finish()), sorted_rows(reference.finish())
     # A pass backwards solves with covariances whose condition is 1e10 and more after long gaps, and each
@@ -167,9 +167,9 @@ def test_the_cores_smoother_is_the_one_in_numpy_over_its_records(seed, motions, 
         declare(core)
         declare(recorder)
     for scan in drawn_stream(seed, 2, 30, motions):
-        core.take(looked(*scan))
+        core.take(step_input(*scan))
         core.hand_over()
-        recorder.take(looked(*scan))
+        recorder.take(step_input(*scan))
         record = recorder.step_record(recorder.record())
         ours.take(record, [Called(track) for track in record.track_id.tolist()])
     found, wanted = in_order(ours.finish()), in_order(core.finish())
@@ -193,7 +193,7 @@ def test_states_that_are_forgotten_change_no_row_behind_them(seed, lag):
         declare(whole)
     for scan in drawn_stream(seed, 2, 40):
         for model in (core, whole):
-            model.take(looked(*scan))
+            model.take(step_input(*scan))
         record = core.record()
         step = core.step_record(record)
         ours.take(step, [Called(track) for track in step.track_id.tolist()])
@@ -231,8 +231,8 @@ def test_a_sensor_may_come_later():
         if k == 5:
             declare(core)
             declare(reference)
-        core.take(looked(*scan))
-        reference.take(looked(*scan))
+        core.take(step_input(*scan))
+        reference.take(step_input(*scan))
         assert_alike(core.rows(), reference.rows(), f"step {k}")
 
 

@@ -22,8 +22,8 @@ struct Scan {
     std::vector<double> logits;
     // How much more likely each box is of a track than of another by its appearance: ln ratio, (tracks, boxes).
     View2<const double> similarity{nullptr, 0, 0};
-    // Where who is who is given: whose each box is, below 0 for nobody's, and whether later ones are the same one's.
-    // Empty where the tracker decides. At most one box of a scan has the same owner.
+    // Where the association is given: the identity of each box, below 0 for none, and whether later boxes have the same
+    // identity. Empty where the tracker decides. At most one box of a scan has an identity.
     std::vector<std::int64_t> owners;
     std::vector<std::uint8_t> awaited;
     std::vector<BySide> spreads;         // how sure the detector is of its boxes' sides; empty where it says nothing
