@@ -71,6 +71,8 @@ CONSTANTS: dict[str, dict[str, dict[str, str]]] = {
             "kBandwidth": "_BANDWIDTH",
             "kBestCount": "_BEST_COUNT",
             "kLeastBoxes": "_LEAST_BOXES",
+            "kLeastVariance": "_LEAST_VARIANCE",
+            "kMostCorrelation": "_MOST_CORRELATION",
         },
         "jeat_graph.filters.object_probability": {
             "kLeastApart": "_LEAST_APART",

@@ -113,6 +113,8 @@ class ModelConstants:
         repeat_share: prior share of the best boxes that come again.
         repeat_trusted: share of the best boxes below which the counts say less and less: all moves far from
             one scan to the next.
+        no_meaning_share: prior probability that a sensor's scores say nothing of what its boxes are of.
+        no_meaning_std: then the scores of boxes that come again have a correlation of this (atanh).
         repeat_count: boxes that this prior counts for, in each score bin.
         best_share: of the boxes, by score, that are the yardstick.
         threshold_offset, threshold_slope: θ_s = offset + slope · z, z the logit below which fewer
@@ -246,6 +248,8 @@ class ModelConstants:
     repeat_overlap: float = 0.4
     repeat_share: float = 0.8
     repeat_trusted: float = 0.3
+    no_meaning_share: float = 0.1
+    no_meaning_std: float = 0.05
     repeat_count: float = 4.0
     best_share: float = 0.3
     threshold_offset: float = 0.4

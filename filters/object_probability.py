@@ -57,7 +57,8 @@ class SensorBelief(NamedTuple):
         agreed_mean, agreed_std: (S,) mean and standard deviation of its scores (logits) of tracks that
             another sensor finds as well.
         agreed_share: (S,) how far these are believed, 0 before any.
-        score_weight: (S,) weight of its scores as evidence, as the user says; 1 where he says nothing.
+        score_weight: (S,) weight of its scores as evidence, as the user says, or as they turn out to have a
+            meaning (`score_calibration.meaning`).
         stationary_prior: (S,) prior of b, by what the sensor is; of a sensor alone the usual one, since b is
             about what the others see.
         noise_share: prior share ν of noise among what is not real.

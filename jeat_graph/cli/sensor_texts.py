@@ -14,6 +14,8 @@ from jeat_graph.tracking.hypotheses import SensorEffect
 _LEAST = 0.02
 # Nor changes of log odds that are smaller, nor boxes that count for nearly as much as the most exact ones.
 _LEAST_CHANGE, _NEARLY = 0.05, 0.95
+# Nor scores that have a meaning with this probability.
+_MEANS = 0.9
 _KINDS = {EVENT: "an event camera", CAMERA: "a camera"}
 
 
@@ -28,6 +30,7 @@ def sensor_texts(config: Config, learnt: Mapping[str, Any]) -> list[str]:
     for name, sensor in sorted(config.sensors.items()):
         found = learnt.get(name)
         error = found.get("lasting_error") if isinstance(found, Mapping) else None
+        weight = found.get("score_weight") if isinstance(found, Mapping) else None
         parts = []
         if sensor.kind is not None:
             blind = found.get("stationary_unseen") if isinstance(found, Mapping) else None
@@ -40,8 +43,14 @@ def sensor_texts(config: Config, learnt: Mapping[str, Any]) -> list[str]:
                 f"its boxes are off by {100.0 * error:.0f} % of an object for as long as they show it "
                 f"({source}), so they move tracks less"
             )
-        if sensor.score_weight != 1.0:
-            parts.append(f"its scores count {sensor.score_weight:g} times (as given)")
+        if sensor.score_weight is not None:
+            if sensor.score_weight != 1.0:
+                parts.append(f"its scores count {sensor.score_weight:g} times (as given)")
+        elif isinstance(weight, float) and weight < _MEANS:
+            parts.append(
+                f"its scores count {weight:.2g} times: those of one thing are no more alike from scan to scan than "
+                "those of different things"
+            )
         if parts:
             lines.append(f"sensor {name}: {'; '.join(parts)}")
     return lines

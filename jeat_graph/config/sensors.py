@@ -47,8 +47,13 @@ class SensorConfig(Section):
         KINDS,
         "what it is; an event camera sees nothing that stands, so its silence there says little",
     )
-    score_weight: float = number(
-        1.0, "1", "weight of its scores as evidence for or against an object; 0: none", 0.0, 10.0
+    score_weight: float | None = number(
+        None,
+        "1",
+        "weight of its scores as evidence for or against an object; 0: none; without it 1, and less where its "
+        "scores turn out to say nothing",
+        0.0,
+        10.0,
     )
     lasting_error: float | None = number(
         None,

@@ -58,6 +58,8 @@ inline constexpr int kScoreBins = 47;
 inline constexpr double kBandwidth = 0.35;
 inline constexpr double kBestCount = 5.0;
 inline constexpr double kLeastBoxes = 1e-09;
+inline constexpr double kLeastVariance = 1e-06;
+inline constexpr double kMostCorrelation = 0.999;
 // filters.object_probability
 inline constexpr double kLeastApart = 0.001;
 inline constexpr double kLeastSum = 1e-09;
@@ -193,6 +195,8 @@ inline constexpr double kLongestAgoS = 1000000000.0;
     JEAT_ONE(repeat_overlap) \
     JEAT_ONE(repeat_share) \
     JEAT_ONE(repeat_trusted) \
+    JEAT_ONE(no_meaning_share) \
+    JEAT_ONE(no_meaning_std) \
     JEAT_ONE(repeat_count) \
     JEAT_ONE(best_share) \
     JEAT_ONE(threshold_offset) \

@@ -69,14 +69,15 @@ def given_of(declared: SensorConfig, constants: ModelConstants) -> tuple[float, 
     """Return what a user says of a sensor, as engines take it.
 
     The logit of the score at which a box is as likely real as not, NaN where it is to be learnt; the weight
-    of its scores; the variance of its lasting error (sizes²), NaN where it is to be learnt; the prior share
+    of its scores, NaN likewise; the variance of its lasting error (sizes²), NaN where it is to be learnt; the prior share
     of objects that it does not see while they stand, by what it is.
     """
     even = math.nan if declared.even_score is None else float(logit(np.array(declared.even_score)))
     lasting = math.nan if declared.lasting_error is None else declared.lasting_error**2
     is_event = declared.kind == EVENT
     blind = constants.event_stationary_unseen_share if is_event else constants.stationary_unseen_share
-    return even, declared.score_weight, lasting, blind
+    weight = math.nan if declared.score_weight is None else declared.score_weight
+    return even, weight, lasting, blind
 
 
 class OneModel(SmoothsRecords):
@@ -148,6 +149,7 @@ class OneModel(SmoothsRecords):
                 stationary_unseen=float(belief.stationary_unseen[k]),
                 noise_scale=float(noise[k]),
                 lasting_error=float(learnt.lasting_error[k]),
+                score_weight=float(belief.score_weight[k]),
                 spread_factor=float(np.sqrt(learnt.spread_gain[k])),
                 offset_centre_share=(offsets[k][0], offsets[k][1]),
                 offset_log_size=(offsets[k][2], offsets[k][3]),

@@ -186,6 +186,7 @@ class ReferenceState:
         repetition: of S sensors, which boxes come again. `begin_scan`
         even_logit: (S,) logit of the score at which the user says that a box is as likely real as not; NaN
             where it is learnt.
+        given_weight: (S,) weight of its scores as the user says; NaN where it is learnt.
         given_lasting: (S,) variance of what lasts of its errors, as the user says (sizes²); NaN where it is
             learnt.
     """
@@ -216,6 +217,7 @@ class ReferenceState:
     boxes_beyond: FloatArray
     repetition: tuple[RepeatCounts, ...]
     even_logit: FloatArray
+    given_weight: FloatArray
     given_lasting: FloatArray
 
     @property
@@ -295,6 +297,7 @@ def initial_state(picture: tuple[float, float] | None, c: ModelConstants) -> Ref
         boxes_beyond=none,
         repetition=(),
         even_logit=none,
+        given_weight=none,
         given_lasting=none,
     )
 
@@ -303,12 +306,13 @@ def declare_sensor(
     state: ReferenceState,
     c: ModelConstants,
     even_logit: float = math.nan,
-    score_weight: float = 1.0,
+    score_weight: float = math.nan,
     lasting: float = math.nan,
     stationary_prior: float | None = None,
 ) -> None:
     """Add a sensor without a scan yet, of which what is usual is believed but for what the user says."""
-    new, old = object_probability.initial_sensor(c, score_weight, stationary_prior), state.sensors
+    weight = 1.0 if math.isnan(score_weight) else score_weight
+    new, old = object_probability.initial_sensor(c, weight, stationary_prior), state.sensors
     columns = (np.append(a, b) for a, b in zip(old[:-1], new[:-1], strict=True))
     state.sensors = SensorBelief._make([*columns, old.noise_share])
     state.tracks, state.ended = state.tracks.widened(), state.ended.widened()
@@ -323,5 +327,6 @@ def declare_sensor(
     state.boxes_beyond = np.append(state.boxes_beyond, 0.0)
     state.repetition = (*state.repetition, score_calibration.no_repetition())
     state.even_logit = np.append(state.even_logit, even_logit)
+    state.given_weight = np.append(state.given_weight, score_weight)
     state.given_lasting = np.append(state.given_lasting, lasting)
     state.accuracy = sensor_accuracy.widened(state.accuracy, 0.0 if math.isnan(lasting) else lasting)

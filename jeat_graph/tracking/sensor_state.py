@@ -16,6 +16,7 @@ class SensorState(NamedTuple):
         unseen: share of real objects that it never detects.
         stationary_unseen: share of the others that it does not detect while they stand.
         lasting_error: standard deviation of what its boxes are off as long as they show one object (sizes).
+        score_weight: weight of its scores as evidence: less than 1 where they turn out to say nothing.
         spread_factor: by which the standard deviations that it gives with its boxes are multiplied;
             1 where it gives none.
         offset_centre_share: offset of its boxes' centres from those of the other sensors, as a share of the
@@ -30,6 +31,7 @@ class SensorState(NamedTuple):
     unseen: float = float("nan")
     stationary_unseen: float = float("nan")
     lasting_error: float = float("nan")
+    score_weight: float = float("nan")
     spread_factor: float = float("nan")
     offset_centre_share: tuple[float, float] = (0.0, 0.0)
     offset_log_size: tuple[float, float] = (0.0, 0.0)

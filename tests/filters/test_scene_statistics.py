@@ -107,6 +107,49 @@ def test_scores_above_which_boxes_come_again_are_found():
     assert score_calibration.decision_threshold(counts, C) == pytest.approx(want)
 
 
+def _repeated(persistent: float, things: int, scans: int, seed: int = 0) -> score_calibration.RepeatedLogits:
+    """Things that stand, whose logits have this share of their variance in common from scan to scan."""
+    rng = np.random.default_rng(seed)
+    counts = score_calibration.no_repetition()
+    boxes = np.arange(things)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+    own = rng.normal(0.0, np.sqrt(persistent), things)
+    for _ in range(scans):
+        logits = 1.0 + own + rng.normal(0.0, np.sqrt(1.0 - persistent), things)
+        counts = score_calibration.count_repetition(counts, boxes, logits, C)
+    return counts.logits
+
+
+def test_scores_of_things_have_a_meaning_and_random_ones_none():
+    for seed in range(10):
+        assert score_calibration.meaning(_repeated(0.6, 12, 30, seed), C) > 0.99
+        assert score_calibration.meaning(_repeated(0.0, 12, 300, seed), C) < 0.5
+    assert score_calibration.meaning(score_calibration.no_repetition().logits, C) == 1.0
+    # A detector with one score for all says nothing, but there is nothing against it.
+    same = score_calibration.RepeatedLogits(500.0, 1000.0, 1000.0, 2000.0, 2000.0, 2000.0)
+    assert score_calibration.meaning(same, C) == 1.0
+
+
+@pytest.mark.parametrize(("things", "scans", "persistent"), [(8, 6, 0.1), (20, 20, 0.05), (12, 60, 0.0)])
+def test_the_weight_of_scores_is_the_posterior_by_integration(things, scans, persistent):
+    sums = _repeated(persistent, things, scans)
+    n = sums.pairs
+    before, after = sums.before / n, sums.after / n
+    covariance = sums.product / n - before * after
+    r = covariance / np.sqrt((sums.before_squared / n - before**2) * (sums.after_squared / n - after**2))
+    x = np.arctanh(max(r, 0.0))
+
+    def evidence(std: float) -> float:
+        """∫ N(x; m, 1/n) N(m; 0, std²) dm."""
+        mean = np.linspace(-8.0 * std, 8.0 * std, 200_001)
+        density = np.exp(-0.5 * n * (x - mean) ** 2 - 0.5 * (mean / std) ** 2)
+        return float(np.trapezoid(density, mean) * np.sqrt(n) / std / (2.0 * np.pi))
+
+    having, without = evidence(1.0), evidence(C.no_meaning_std)
+    want = 0.9 * having / (0.9 * having + 0.1 * without)
+    assert C.no_meaning_share == 0.1
+    assert score_calibration.meaning(sums, C) == pytest.approx(want, rel=1e-6)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_box_that_overlaps_a_better_one_is_less_likely_an_object(seed):
     rng = np.random.default_rng(seed)

@@ -12,8 +12,37 @@
 
 namespace jeat::filters {
 
+// Sums over boxes that come again at their place, of both logits (before, after).
+struct RepeatedLogits {
+    double pairs = 0.0, before = 0.0, after = 0.0, before_squared = 0.0, after_squared = 0.0, product = 0.0;
+
+    void add(double z, double z_next) {
+        pairs += 1.0;
+        before += z;
+        after += z_next;
+        before_squared += z * z;
+        after_squared += z_next * z_next;
+        product += z * z_next;
+    }
+
+    // Probability that a box's score says something of what the box is of: 1 before anything is counted.
+    double meaning(const ModelConstants& c) const {
+        if (pairs < 1.0) return 1.0;
+        const double before_variance = before_squared - before * before / pairs,
+                     after_variance = after_squared - after * after / pairs;
+        if (!(std::min(before_variance, after_variance) > kLeastVariance * pairs)) return 1.0;
+        const double r = clamp((product - before * after / pairs) / std::sqrt(before_variance * after_variance), 0.0,
+                               kMostCorrelation);
+        const double x = 0.5 * (log1p_of(r) - log1p_of(-r));
+        const double without = 1.0 / pairs + square(c.no_meaning_std), with = 1.0 / pairs + 1.0;
+        const double log_factor = 0.5 * (log_of(without / with) + x * x * (1.0 / without - 1.0 / with));
+        return 1.0 - expit(log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - log_factor);
+    }
+};
+
 struct RepeatCounts {
     std::array<double, kScoreBins> boxes{}, repeated{};
+    RepeatedLogits logits;
     std::int64_t scans = 0;
     std::vector<Sides> last_boxes;
     std::vector<double> last_logits;
@@ -21,8 +50,8 @@ struct RepeatCounts {
     bool has_last = false;
 
     // `assignment` is room to work in.
-    void count(const std::vector<Sides>& now, const std::vector<double>& logits, association::Assignment& assignment,
-               const ModelConstants& c) {
+    void count(const std::vector<Sides>& now, const std::vector<double>& new_logits,
+               association::Assignment& assignment, const ModelConstants& c) {
         std::vector<std::uint8_t> had_before(now.size(), 0), has_after(last_boxes.size(), 0);
         if (has_last && !now.empty() && !last_boxes.empty()) {
             const ByLeft index(now);
@@ -32,8 +61,11 @@ struct RepeatCounts {
                     const double overlap = intersection_over_union(last_boxes[i], box);
                     if (overlap >= c.repeat_overlap) pairs.push_back({i, j, overlap});
                 });
-            for (const std::size_t k : assignment.solve(pairs, last_boxes.size(), now.size(), c.exact_assignment))
-                has_after[pairs[k].row] = had_before[pairs[k].column] = 1;
+            for (const std::size_t k : assignment.solve(pairs, last_boxes.size(), now.size(), c.exact_assignment)) {
+                const auto& [i, j, overlap] = pairs[k];
+                has_after[i] = had_before[j] = 1;
+                logits.add(last_logits[i], new_logits[j]);
+            }
         }
         if (has_last && scans > 1) {
             for (std::size_t i = 0; i < last_boxes.size(); ++i) {
@@ -43,7 +75,7 @@ struct RepeatCounts {
         }
         scans += 1;
         last_boxes = now;
-        last_logits = logits;
+        last_logits = new_logits;
         last_had_before = std::move(had_before);
         has_last = true;
     }

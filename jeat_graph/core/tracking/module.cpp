@@ -480,10 +480,11 @@ void bind(nb::module_& module) {
              "infinite for whole tracks, negative for none.")
         .def(
             "declare_sensor", exclusive(&Model::declare_sensor),
-            nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(), nb::arg("score_weight") = 1.0,
+            nb::arg("even_logit") = std::numeric_limits<double>::quiet_NaN(),
+            nb::arg("score_weight") = std::numeric_limits<double>::quiet_NaN(),
             nb::arg("lasting") = std::numeric_limits<double>::quiet_NaN(), nb::arg("stationary_prior") = nb::none(),
             "Add a sensor that has had no scan yet. even_logit: of the score at which a box is as likely real as not,\n"
-            "NaN where it is to be learnt; score_weight: of its scores as evidence; lasting: variance of what lasts of\n"
+            "NaN where it is to be learnt; score_weight: of its scores as evidence, NaN likewise; lasting: variance of what lasts of\n"
             "its errors (sizes²), NaN where it is to be learnt; stationary_prior: share of objects that it does not see while\n"
             "they stand, by what the sensor is.")
         .def(

@@ -144,7 +144,7 @@ void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_
 
 template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix, Sensor& sensor) {
     auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_scan_s, repetition, even_logit,
-           given_lasting, mean_spread] = sensor;
+           given_weight, given_lasting, mean_spread] = sensor;
     v.numbers(prefix + "leftovers", &leftovers, 1);
     v.numbers(prefix + "false_boxes", &false_boxes, 1);
     v.numbers(prefix + "boxes_at_edge", &boxes_at_edge, 1);
@@ -152,13 +152,21 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
     v.numbers(prefix + "period_s", &period_s, 1, Values::any);
     v.numbers(prefix + "last_scan_s", &last_scan_s, 1, Values::any);
     v.numbers(prefix + "even_logit", &even_logit, 1, Values::any);
+    v.numbers(prefix + "given_weight", &given_weight, 1, Values::any);
     v.numbers(prefix + "given_lasting", &given_lasting, 1, Values::any);
     v.numbers(prefix + "mean_spread", &mean_spread, 1, Values::any);
-    auto& [boxes, repeated, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
+    auto& [boxes, repeated, logits, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
     std::size_t rows = last_boxes.size();
     v.whole(prefix + "rows", rows);
     v.numbers(prefix + "boxes", boxes.data(), boxes.size());
     v.numbers(prefix + "repeated", repeated.data(), repeated.size());
+    auto& [pairs, before, after, before_squared, after_squared, product] = logits;
+    v.numbers(prefix + "logits.pairs", &pairs, 1);
+    v.numbers(prefix + "logits.before", &before, 1);
+    v.numbers(prefix + "logits.after", &after, 1);
+    v.numbers(prefix + "logits.before_squared", &before_squared, 1);
+    v.numbers(prefix + "logits.after_squared", &after_squared, 1);
+    v.numbers(prefix + "logits.product", &product, 1);
     v.whole(prefix + "scans", scans);
     v.column(prefix + "last_boxes", last_boxes, rows, 1);
     v.column(prefix + "last_logits", last_logits, rows, 1);

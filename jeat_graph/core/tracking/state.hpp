@@ -105,6 +105,8 @@ struct Sensor {
     // What the user says of it: the logit of the score at which a box is as likely real as not, NaN where it is to
     // be learnt.
     double even_logit = std::numeric_limits<double>::quiet_NaN();
+    // The weight of its scores, NaN where it is to be learnt.
+    double given_weight = std::numeric_limits<double>::quiet_NaN();
     // And the variance of what lasts of its errors (sizes²), NaN where it is to be learnt.
     double given_lasting = std::numeric_limits<double>::quiet_NaN();
     // The mean square of the spreads that it gives with its boxes (sizes²), NaN where none is known.
@@ -167,7 +169,7 @@ struct State {
     }
 
     void declare_sensor(double even_logit, double score_weight, double given_lasting, double stationary_prior) {
-        belief.widen(constants, score_weight, stationary_prior);
+        belief.widen(constants, std::isnan(score_weight) ? 1.0 : score_weight, stationary_prior);
         tracks.widen();
         ended.widen();
         offsets.widen();
@@ -175,6 +177,7 @@ struct State {
         Sensor sensor;
         sensor.leftovers = sensor.false_boxes = constants.first_leftovers;
         sensor.even_logit = even_logit;
+        sensor.given_weight = score_weight;
         sensor.given_lasting = given_lasting;
         accuracy.widen(std::isnan(given_lasting) ? 0.0 : given_lasting);
         sensors.push_back(std::move(sensor));

@@ -152,6 +152,8 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
     require(!std::isinf(sensor.last_scan_s), name + "last_scan_s", "is no time");
     check_past(name + "last_scan_s", sensor.last_scan_s, now);
     require(!(std::abs(sensor.even_logit) > kMostLogVariance), name + "even_logit", "is of no score");
+    require(!(sensor.given_weight < 0.0) && !(sensor.given_weight > kMostLogVariance), name + "given_weight",
+            "is no weight");
     require(!(sensor.given_lasting < 0.0) && !(sensor.given_lasting > 1.0), name + "given_lasting", "is no variance");
     require(!(sensor.mean_spread < kLeastSpread) && !(sensor.mean_spread > kMostSpread), name + "mean_spread",
             "is no variance");
@@ -162,6 +164,11 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
         check_between(name + "boxes", boxes, 0.0, kMostCount);
         check_between(name + "repeated", repeated, 0.0, boxes * (1.0 + kShareRounding));
     }
+    const RepeatedLogits& logits = counts.logits;
+    for (const double count : {logits.pairs, logits.before_squared, logits.after_squared})
+        check_between(name + "logits", count, 0.0, kMostCount);
+    for (const double sum : {logits.before, logits.after, logits.product})
+        check_between(name + "logits", sum, -kMostCount, kMostCount);
     require(counts.scans <= kMostIdentities, name + "scans", "are too many");
     check_between(name + "last_logits", counts.last_logits, -kMostLogVariance, kMostLogVariance);
     for (const Sides& box : counts.last_boxes)
