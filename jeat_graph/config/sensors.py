@@ -50,8 +50,8 @@ class SensorConfig(Section):
     score_weight: float | None = number(
         None,
         "1",
-        "weight of its scores as evidence for or against an object; 0: none; without it 1, and less where its "
-        "scores turn out to say nothing",
+        "weight of its scores as evidence for or against an object; 0: none; without it 1, and less where "
+        "its scores turn out to say nothing",
         0.0,
         10.0,
     )

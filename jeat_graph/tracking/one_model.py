@@ -69,8 +69,8 @@ def given_of(declared: SensorConfig, constants: ModelConstants) -> tuple[float, 
     """Return what a user says of a sensor, as engines take it.
 
     The logit of the score at which a box is as likely real as not, NaN where it is to be learnt; the weight
-    of its scores, NaN likewise; the variance of its lasting error (sizes²), NaN where it is to be learnt; the prior share
-    of objects that it does not see while they stand, by what it is.
+    of its scores, NaN likewise; the variance of its lasting error (sizes²), NaN where it is to be learnt; the
+    prior share of objects that it does not see while they stand, by what it is.
     """
     even = math.nan if declared.even_score is None else float(logit(np.array(declared.even_score)))
     lasting = math.nan if declared.lasting_error is None else declared.lasting_error**2
