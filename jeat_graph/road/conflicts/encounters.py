@@ -274,8 +274,8 @@ def _least_ttc(first: Poses, second: Poses, z: FloatArray) -> tuple[Collision, B
         k = int(np.argmin(np.abs(separation(a.mean, b.mean))))
     around = np.abs(t - t[k]) <= _AROUND_S
     a, b = first.at(t[around]), second.at(t[around])
-    states = a.drawn(z[:, :6]), b.drawn(z[:, 6:])
-    drawn, crash = collision(*states), np.asarray((separation(*states) <= 0.0).any(axis=1), dtype=np.bool_)
+    drawn = collision(a.drawn(z[:, :6]), b.drawn(z[:, 6:]))
+    crash = np.asarray((drawn.ttc == 0.0).any(axis=1), dtype=np.bool_)
     return Collision(drawn.ttc.min(axis=1), drawn.drac.max(axis=1)), crash, float(t[k])
 
 

@@ -33,20 +33,23 @@ class Collision(NamedTuple):
     drac: FloatArray
 
 
-def _axes(a: FloatArray, b: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
-    """Directions (..., 2) of the sides, with the half extents (...) of both together along each."""
-    ways = []
-    for one in (a, b):
-        u = np.stack([np.sin(one[..., HEADING]), np.cos(one[..., HEADING])], axis=-1)
-        ways.append((u, np.stack([u[..., 1], -u[..., 0]], axis=-1)))
+def _direction(one: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return x and y (...) of the unit vector along a rectangle (..., 6)."""
+    return np.sin(one[..., HEADING]), np.cos(one[..., HEADING])
+
+
+def _axes(a: FloatArray, b: FloatArray) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Directions x, y (...) of the sides, with the half extents (...) of both together along each.
+
+    The first is that along a, the third that along b.
+    """
+    (ax, ay), (bx, by) = _direction(a), _direction(b)
+    along, across = np.abs(ax * bx + ay * by), np.abs(ax * by - ay * bx)
     axes = []
-    for axis in (*ways[0], *ways[1]):
-        half = sum(
-            one[..., LENGTH] / 2.0 * np.abs((u * axis).sum(axis=-1))
-            + one[..., WIDTH] / 2.0 * np.abs((n * axis).sum(axis=-1))
-            for one, (u, n) in zip((a, b), ways, strict=True)
-        )
-        axes.append((axis, np.asarray(half)))
+    for one, other, x, y in ((a, b, ax, ay), (b, a, bx, by)):
+        length, width = other[..., LENGTH], other[..., WIDTH]
+        axes.append((x, y, (one[..., LENGTH] + length * along + width * across) / 2.0))
+        axes.append((y, -x, (one[..., WIDTH] + length * across + width * along) / 2.0))
     return axes
 
 
@@ -57,16 +60,14 @@ def collision(a: FloatArray, b: FloatArray) -> Collision:
         a: (..., 6) states of one vehicle (`Poses`).
         b: (..., 6) states of the other at the same times.
     """
-    between = b[..., :2] - a[..., :2]
-    velocity = [
-        one[..., SPEED, None] * np.stack([np.sin(one[..., HEADING]), np.cos(one[..., HEADING])], axis=-1)
-        for one in (a, b)
-    ]
-    closing = velocity[1] - velocity[0]
-    begin, end = np.full(between.shape[:-1], -np.inf), np.full(between.shape[:-1], np.inf)
-    rate = np.zeros(between.shape[:-1])
-    for axis, half in _axes(a, b):
-        s, r = (between * axis).sum(axis=-1), (closing * axis).sum(axis=-1)
+    dx, dy = b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]
+    axes = _axes(a, b)
+    (ax, ay, _), (bx, by, _) = axes[::2]
+    closing_x = b[..., SPEED] * bx - a[..., SPEED] * ax
+    closing_y = b[..., SPEED] * by - a[..., SPEED] * ay
+    begin, end, rate = np.full(dx.shape, -np.inf), np.full(dx.shape, np.inf), np.zeros(dx.shape)
+    for x, y, half in axes:
+        s, r = dx * x + dy * y, closing_x * x + closing_y * y
         still = np.abs(r) < _STILL
         safe = np.where(still, 1.0, r)
         first, second = (-half - s) / safe, (half - s) / safe
@@ -86,8 +87,8 @@ def collision(a: FloatArray, b: FloatArray) -> Collision:
 
 def separation(a: FloatArray, b: FloatArray) -> FloatArray:
     """How far rectangles (..., 6) are apart, along the direction that shows it best (m); below 0: overlap."""
-    between = b[..., :2] - a[..., :2]
-    gaps = [np.abs((between * axis).sum(axis=-1)) - half for axis, half in _axes(a, b)]
+    dx, dy = b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]
+    gaps = [np.abs(dx * x + dy * y) - half for x, y, half in _axes(a, b)]
     return np.asarray(np.max(np.stack(gaps), axis=0))
 
 

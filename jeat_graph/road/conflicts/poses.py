@@ -45,7 +45,9 @@ class Poses(NamedTuple):
 
     def drawn(self, z: FloatArray) -> FloatArray:
         """States (K, N, 6) with errors z (K, 6), which last for as long as an encounter does."""
-        out: FloatArray = self.mean + z[:, None] * self.sigma
+        mean, sigma = self.mean.T[:, None], self.sigma.T[:, None]
+        # A state's values lie side by side in memory: it is one state at a time that is worked with.
+        out: FloatArray = np.moveaxis(mean + z.T[:, :, None] * sigma, 0, -1)
         out[..., SPEED] = np.maximum(out[..., SPEED], 0.0)
         out[..., LENGTH:] = np.maximum(out[..., LENGTH:], 0.1)
         return out
