@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import stdev
@@ -23,12 +23,15 @@ from jeat_graph.detection.detecting import FUSED_SENSOR
 if TYPE_CHECKING:
     from jeat_graph.data.detections import Detections
     from jeat_graph.eval.tables import Cell, Table
+    from jeat_graph_sehn.training.truth_at import TruthByTime
 
 #: Boxes by the root of their area (px): the paper's smaller half, and COCO's limit.
 SIDES = {"below 12 px": (0.0, 12.0), "12 to 32 px": (12.0, 32.0), "above 32 px": (32.0, np.inf)}
-ALL, MOVED = "all", "that moved"
+ALL, MOVED, STOPPED = "all", "that moved", "that stopped"
 #: Who has gone less (px) in the time (s) before an instant, that is of few events, does not count as moved.
 _LEAST_WAY_PX, _BEFORE_S = 1.0, 0.2
+#: Who has gone so far since the recording began (px), and less than that in the time above, has stopped.
+_GONE_PX, _STANDS_PX = 3.0, 0.3
 #: Average precision is over all scores; what is certainly wrong only takes time.
 _EVERY_SCORE = ("model_frames.score=0.01", "model_events.score=0.01", "model_fused.score=0.01")
 _KEYS = ("AP50", "AP")
@@ -75,8 +78,8 @@ def judge_detector(found: Sequence[RawFound]) -> dict[str, Any]:
 
     Returns:
         `scans`, `scans_per_cpu_s`, and by name of a group of vehicles (`all`, each data set, `that moved`,
-        sizes): `AP50` and `AP` (%, segments pooled), `boxes`, `segments`, and the standard deviation of AP50
-        over segments.
+        `that stopped`, sizes): `AP50` and `AP` (%, segments pooled), `boxes`, `segments`, and the standard
+        deviation of AP50 over segments.
     """
     truths = [one.finding.segment.truth() for one in found]
     pairs = [(truth, one.detections) for truth, one in zip(truths, found, strict=True)]
@@ -85,6 +88,7 @@ def judge_detector(found: Sequence[RawFound]) -> dict[str, Any]:
         own = [p for p, one in zip(pairs, found, strict=True) if one.finding.segment.source == source]
         groups[source] = _ap(own)
     groups[MOVED] = _ap([(only_moved(truth), detections) for truth, detections in pairs])
+    groups[STOPPED] = _ap([(only_stopped(truth), detections) for truth, detections in pairs])
     for name, sides in SIDES.items():
         groups[name] = _ap(pairs, sides)
     scans = sum(one.detections.num_scans for one in found)
@@ -97,14 +101,32 @@ def judge_detector(found: Sequence[RawFound]) -> dict[str, Any]:
 
 def only_moved(truth: GroundTruth) -> GroundTruth:
     """Ignore what has hardly moved in the last moments: no event camera, and no background, shows it."""
+    lookup = _ways(truth)
+    return _only(truth, lambda t: lookup.moved(t - _BEFORE_S, t, _LEAST_WAY_PX))
+
+
+def only_stopped(truth: GroundTruth) -> GroundTruth:
+    """Ignore all but what drove and stands now: of that an event camera shows nothing, but it has seen it."""
+    lookup, start = _ways(truth), float(truth.frame_times()[0])
+
+    def stopped(t: float) -> set[int]:
+        return lookup.moved(start, t, _GONE_PX) - lookup.moved(t - _BEFORE_S, t, _STANDS_PX)
+
+    return _only(truth, stopped)
+
+
+def _ways(truth: GroundTruth) -> TruthByTime:
     from jeat_graph_sehn.training.truth_at import TruthByTime
 
-    lookup = TruthByTime(truth)
+    return TruthByTime(truth)
+
+
+def _only(truth: GroundTruth, chosen: Callable[[float], set[int]]) -> GroundTruth:
+    """Ignore all but the objects that are chosen at each time (s)."""
     ignore = truth.ignore.copy()
     for t in truth.frame_times().tolist():
         rows = np.flatnonzero(np.abs(truth.t - t) <= 1e-6)
-        moved = lookup.moved(t - _BEFORE_S, t, _LEAST_WAY_PX)
-        ignore[rows] |= ~np.isin(truth.object_id[rows], list(moved))
+        ignore[rows] |= ~np.isin(truth.object_id[rows], list(chosen(t)))
     return replace(truth, ignore=ignore)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.detection import only_moved
+from benchmarks.detection import only_moved, only_stopped
 from benchmarks.raw_segments import segments_in
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.trajectories import GroundTruth
@@ -189,3 +189,19 @@ def test_who_stands_is_not_asked_of_those_who_see_motion():
     ignored = only_moved(truth).ignore.reshape(5, 2)
     assert ignored[:, 1].all()
     assert ignored[:, 0].tolist() == [True, False, False, False, False]
+
+
+def test_who_has_stopped_is_told_from_who_never_went():
+    """Vehicle 1 goes 40 px/s for 0.2 s and stands then; vehicle 2 always stands."""
+    times = np.arange(12) * 0.05
+    boxes = [[x, 0.0, 10.0, 10.0] for t in times for x in (40.0 * min(t, 0.2), 50.0)]
+    truth = GroundTruth(
+        t=np.repeat(times, 2),
+        object_id=np.tile([1, 2], 12),
+        boxes=np.array(boxes),
+        motion=None,
+        ignore=np.zeros(24, dtype=bool),
+    )
+    asked = ~only_stopped(truth).ignore.reshape(12, 2)
+    assert not asked[:, 1].any()
+    assert asked[:, 0].tolist() == [bool(t > 0.4 - 1e-9) for t in times]
