@@ -136,6 +136,7 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     """Track a recording and judge the tracks, and draw them."""
     from jeat_graph.config.reading import as_config, load_config
     from jeat_graph.io.tables.detections_io import write_detections
+    from jeat_graph.io.tables.sensor_columns import as_settings
     from jeat_graph.io.tables.trajectories_io import read_trajectories
     from jeat_graph.io.tables.truth_io import write_truth
     from jeat_graph.runs.declaring import fit_input
@@ -143,16 +144,19 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     from jeat_graph.runs.input_checks import check_detections
     from jeat_graph.runs.inputs import describe_inputs
     from jeat_graph.runs.run_options import RunOptions, RunRecord
+    from jeat_graph.runs.track_files import DECLARING_CONFIG
     from jeat_graph.runs.tracking_run import write_run
 
-    config = load_config(args.config)  # what is wrong in it is reported before anything is simulated
+    load_config(args.config)  # what is wrong in it is reported before anything is simulated
     recording = _recording(args)
+    declared = as_settings(recording.declared) if args.config == DECLARING_CONFIG else []
+    config = load_config(args.config, declared)
     config = as_config(config, (recording.width, recording.height))
     config = fit_input(config, recording.detections)[0]
     directory = RunDirectory(out / "run")
     warnings = check_detections(recording.detections, config, recording.name)
     source = out / "detections.csv"
-    write_detections(recording.detections, source)
+    write_detections(recording.detections, source, declared=recording.declared)
     write_truth(recording.truth, out / "gt.csv")
 
     length_s = float(recording.detections.scan_t[-1] - recording.detections.scan_t[0])

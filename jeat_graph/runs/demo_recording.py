@@ -18,6 +18,7 @@ from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.io.tables.detections_io import read_detections
+from jeat_graph.io.tables.sensor_columns import Declared, declared_by
 from jeat_graph.io.tables.truth_io import read_truth
 
 DETECTIONS, TRUTH, PICTURE = "detections.csv.gz", "gt.csv.gz", "picture.json"
@@ -34,6 +35,7 @@ class DemoRecording:
         width: of the picture (px).
         height: of the picture (px).
         lines: the road's markings, polylines (K, 2) in px; parts of them may lie outside the picture.
+        declared: what is known of the sensors, as columns of the detections say it.
     """
 
     name: str
@@ -42,6 +44,7 @@ class DemoRecording:
     width: int
     height: int
     lines: Sequence[FloatArray]
+    declared: Declared
 
 
 def read_demo_recording() -> DemoRecording:
@@ -55,4 +58,5 @@ def read_demo_recording() -> DemoRecording:
             width=picture["width"],
             height=picture["height"],
             lines=[np.array(line) for line in picture["lines"]],
+            declared=declared_by(folder / DETECTIONS),
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.trajectories import GroundTruth
 from jeat_graph.runs.demo_recording import DemoRecording
-from jeat_graph_sehn.simulation.scenario import load_scenario
+from jeat_graph_sehn.simulation.scenario import kinds_of, load_scenario
 from jeat_graph_sehn.simulation.simulate import record
 from jeat_graph_sehn.simulation.simulate import simulate as simulate_scenario
 from jeat_graph_sehn.simulation.world.markings import marking_lines
@@ -48,4 +48,5 @@ def record_demo(scenario: str, density: str | None, duration_s: float, seed: int
         width=camera.width,
         height=camera.height,
         lines=marking_lines(recording.scene),
+        declared=kinds_of(recording.scenario),
     )

@@ -32,7 +32,7 @@ def write_demo(recording: DemoRecording, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as name:
         plain = Path(name) / "plain.csv"
-        write_detections(recording.detections, plain)
+        write_detections(recording.detections, plain, declared=recording.declared)
         (folder / DETECTIONS).write_bytes(_packed(plain))
         write_truth(recording.truth, plain)
         (folder / TRUTH).write_bytes(_packed(plain))

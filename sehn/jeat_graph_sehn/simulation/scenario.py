@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from jeat_graph.config.section_tree import build, check_keys, convert, merge, plain, read_tree
+from jeat_graph.config.sensors import CAMERA, EVENT
 from jeat_graph.data.errors import ConfigError
 from jeat_graph_sehn.simulation.sensors.detector import SensorModel
 from jeat_graph_sehn.simulation.world.camera import CameraConfig
@@ -50,6 +51,12 @@ class Scenario:
     def __post_init__(self) -> None:
         if self.truth_sensor not in self.sensors:
             raise ConfigError(f"truth_sensor: {self.truth_sensor!r} is not a declared sensor")
+
+
+def kinds_of(scenario: Scenario) -> dict[str, dict[str, str]]:
+    """Return what each sensor is (`kind`), by name: one that is blind to what stands is an event camera."""
+    blind = {name: sensor.detect.blind_speed > 0.0 for name, sensor in scenario.sensors.items()}
+    return {name: {"kind": EVENT if is_blind else CAMERA} for name, is_blind in blind.items()}
 
 
 def scenario_names() -> list[str]:

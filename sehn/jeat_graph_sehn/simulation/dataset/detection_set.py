@@ -31,7 +31,7 @@ from jeat_graph_sehn.simulation.dataset.layout import (
     TRUTH,
     TRUTH_ROAD,
 )
-from jeat_graph_sehn.simulation.scenario import Scenario, scenario_to_yaml
+from jeat_graph_sehn.simulation.scenario import Scenario, kinds_of, scenario_to_yaml
 from jeat_graph_sehn.simulation.simulate import RIG_SENSOR, SimulatedRecording, record
 from jeat_graph_sehn.simulation.world.rig import Rig, RigConfig
 
@@ -87,7 +87,7 @@ def _write(
     true_rig: str | None,
 ) -> dict[str, Any]:
     detections, truth, scenario = recording.detections, recording.truth, recording.scenario
-    write_detections(detections, out / DETECTIONS)
+    write_detections(detections, out / DETECTIONS, declared=kinds_of(scenario))
     on_step()
     write_truth(truth, out / TRUTH)
     write_columns(road_truth(recording), out / TRUTH_ROAD)

@@ -12,6 +12,7 @@ import yaml
 from jeat_graph.cli.main import main
 from jeat_graph.io.events.dsec_hdf5 import EventFile
 from jeat_graph.io.media.video import open_frames
+from jeat_graph.io.tables.sensor_columns import declared_by
 from jeat_graph_sehn.simulation import compiling
 from jeat_graph_sehn.simulation.dataset.manifest import read_json
 from jeat_graph_sehn.simulation.scenario import load_scenario
@@ -140,3 +141,9 @@ def test_carla_without_its_client_package_is_one_line(tmp_path: Path, monkeypatc
     assert main(["simulate", "night", "--out", str(tmp_path / "set"), "--sensors", "carla"]) == 2
     assert "pip install './sehn[carla]'" in capsys.readouterr().err
     assert not (tmp_path / "set").exists()
+
+
+def test_detections_say_which_sensor_is_an_event_camera(tmp_path: Path) -> None:
+    out = tmp_path / "set"
+    assert main(["simulate", "night-nolight", "--out", str(out), "--duration", "0.5", "--seed", "3"]) == 0
+    assert declared_by(out / "detections.csv") == {"evt": {"kind": "event"}, "rgb": {"kind": "camera"}}
