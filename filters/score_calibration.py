@@ -171,8 +171,9 @@ def meaning(sums: RepeatedLogits, c: ModelConstants) -> float:
     Scores that are alike from scan to scan, of different things unlike, have a correlation ρ. By Fisher's
     transform x = atanh r is normal about atanh ρ with the variance 1/n; atanh ρ has the standard deviation 1
     where scores have a meaning, and `no_meaning_std` where not (Fisher, "Frequency distribution of the values
-    of the correlation coefficient", Biometrika 10, 1915). With one score for all there is nothing to say
-    against it.
+    of the correlation coefficient", Biometrika 10, 1915). Scores of no meaning are spread as widely as a
+    detector's scores are: as far as these are not, because one thing alone is seen, or all have one score,
+    there is nothing to say against them.
     """
     n = sums.pairs
     if n < 1.0:
@@ -180,12 +181,13 @@ def meaning(sums: RepeatedLogits, c: ModelConstants) -> float:
     variance = sums.before_squared - sums.before**2 / n, sums.after_squared - sums.after**2 / n
     if not min(variance) > _LEAST_VARIANCE * n:
         return 1.0
-    r = (sums.product - sums.before * sums.after / n) / math.sqrt(variance[0] * variance[1])
+    spread = math.sqrt(variance[0] * variance[1])
+    r = (sums.product - sums.before * sums.after / n) / spread
     x = math.atanh(min(max(r, 0.0), _MOST_CORRELATION))
     without, having = 1.0 / n + c.no_meaning_std**2, 1.0 / n + 1.0
     log_factor = 0.5 * (math.log(without / having) + x * x * (1.0 / without - 1.0 / having))
     odds = math.log(c.no_meaning_share / (1.0 - c.no_meaning_share)) - log_factor
-    return 1.0 - float(expit(odds))
+    return 1.0 - float(expit(odds)) * min(1.0, spread / (n * c.agreed_std**2))
 
 
 def _kernel(logits: FloatArray) -> FloatArray:

@@ -107,14 +107,16 @@ def test_scores_above_which_boxes_come_again_are_found():
     assert score_calibration.decision_threshold(counts, C) == pytest.approx(want)
 
 
-def _repeated(persistent: float, things: int, scans: int, seed: int = 0) -> score_calibration.RepeatedLogits:
+def _repeated(
+    persistent: float, things: int, scans: int, seed: int = 0, std: float = 1.5
+) -> score_calibration.RepeatedLogits:
     """Things that stand, whose logits have this share of their variance in common from scan to scan."""
     rng = np.random.default_rng(seed)
     counts = score_calibration.no_repetition()
     boxes = np.arange(things)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
     own = rng.normal(0.0, np.sqrt(persistent), things)
     for _ in range(scans):
-        logits = 1.0 + own + rng.normal(0.0, np.sqrt(1.0 - persistent), things)
+        logits = 1.0 + std * (own + rng.normal(0.0, np.sqrt(1.0 - persistent), things))
         counts = score_calibration.count_repetition(counts, boxes, logits, C)
     return counts.logits
 
@@ -123,6 +125,8 @@ def test_scores_of_things_have_a_meaning_and_random_ones_none():
     for seed in range(10):
         assert score_calibration.meaning(_repeated(0.6, 12, 30, seed), C) > 0.99
         assert score_calibration.meaning(_repeated(0.0, 12, 300, seed), C) < 0.5
+        # A car that is parked alone, and is as surely found all the time.
+        assert score_calibration.meaning(_repeated(0.0, 1, 300, seed, std=0.3), C) > 0.9
     assert score_calibration.meaning(score_calibration.no_repetition().logits, C) == 1.0
     # A detector with one score for all says nothing, but there is nothing against it.
     same = score_calibration.RepeatedLogits(500.0, 1000.0, 1000.0, 2000.0, 2000.0, 2000.0)
@@ -145,8 +149,9 @@ def test_the_weight_of_scores_is_the_posterior_by_integration(things, scans, per
         return float(np.trapezoid(density, mean) * np.sqrt(n) / std / (2.0 * np.pi))
 
     having, without = evidence(1.0), evidence(C.no_meaning_std)
-    want = 0.9 * having / (0.9 * having + 0.1 * without)
     assert C.no_meaning_share == 0.1
+    variance = np.sqrt((sums.before_squared / n - before**2) * (sums.after_squared / n - after**2))
+    want = 1.0 - min(1.0, variance / C.agreed_std**2) * 0.1 * without / (0.9 * having + 0.1 * without)
     assert score_calibration.meaning(sums, C) == pytest.approx(want, rel=1e-6)
 
 

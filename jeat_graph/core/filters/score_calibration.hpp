@@ -31,12 +31,13 @@ struct RepeatedLogits {
         const double before_variance = before_squared - before * before / pairs,
                      after_variance = after_squared - after * after / pairs;
         if (!(std::min(before_variance, after_variance) > kLeastVariance * pairs)) return 1.0;
-        const double r = clamp((product - before * after / pairs) / std::sqrt(before_variance * after_variance), 0.0,
-                               kMostCorrelation);
+        const double spread = std::sqrt(before_variance * after_variance);
+        const double r = clamp((product - before * after / pairs) / spread, 0.0, kMostCorrelation);
         const double x = 0.5 * (log1p_of(r) - log1p_of(-r));
         const double without = 1.0 / pairs + square(c.no_meaning_std), with = 1.0 / pairs + 1.0;
         const double log_factor = 0.5 * (log_of(without / with) + x * x * (1.0 / without - 1.0 / with));
-        return 1.0 - expit(log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - log_factor);
+        const double none = expit(log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - log_factor);
+        return 1.0 - none * std::min(1.0, spread / (pairs * square(c.agreed_std)));
     }
 };
 
