@@ -30,6 +30,7 @@ from jeat_graph.detection.request import DetectRequest
 from jeat_graph.detection.settings import BESIDE_RATE_HZ
 
 if TYPE_CHECKING:
+    from jeat_graph.detection.models.events import ModelEventDetector
     from jeat_graph.io.events.reader import EventReader
     from jeat_graph.io.media.video import FrameSource
 
@@ -261,14 +262,14 @@ def _fused_scans(
     if recording is None:
         assert source is not None
         detector = FusedDetector(network, source.size_px, FUSED_SENSOR, *settings)
-        say(detector.description)
+        _introduce(detector, say)
         flow = CameraFlow(request.settings.camera)
         found = (flow(frame, detector.scan_of(frame, t)) for t, frame in with_progress(source, len(source)))
         return _with_note(found, detector.note, say)
     reader, size_px = recording
     pictures = () if source is None else with_progress(source, len(source))
     detector = FusedDetector(network, size_px, FUSED_SENSOR, *settings, pictures)
-    say(detector.description)
+    _introduce(detector, say)
     return _with_note(_pushed(detector, reader, request, say), detector.note, say)
 
 
@@ -321,8 +322,14 @@ def event_detector(
     if request.frames is not None:
         times = replace(times, rate_hz=times.rate(BESIDE_RATE_HZ))
     model = ModelEventDetector(network, size_px, EVENTS_SENSOR, times, settings.model_events)
-    say(model.description)
+    _introduce(model, say)
     return model, model.note
+
+
+def _introduce(model: ModelEventDetector, say: Callable[[str], object]) -> None:
+    say(model.description)
+    if model.hint:
+        say(model.hint)
 
 
 def _pushed(

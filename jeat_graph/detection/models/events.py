@@ -15,10 +15,12 @@ from jeat_graph.data.events import EventArray
 from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.models.engine import open_engine
 from jeat_graph.detection.models.event_places import EventPlaces, event_scale
+from jeat_graph.detection.models.feeding import letterbox_scale
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, Port, read_onnx_head
 from jeat_graph.detection.models.output_reader import OutputReader, scan_within
 from jeat_graph.detection.models.recognising import given_shapes
+from jeat_graph.detection.models.tiling import UNLIMITED, Tiling, tiled_scale
 from jeat_graph.detection.settings import USUAL_RATE_HZ, EventSettings
 from jeat_graph.detection.windows import EventBins
 
@@ -32,7 +34,8 @@ class ModelEventDetector(BinnedDetector):
 
     Its first input is the stacked histogram (1, 2 x bins, height, width) of `windows.EventBins`. A network
     that `train` made is shown the camera's picture as large as its input allows; of others a picture that is
-    smaller is filled up with zeros at the right and below. Further inputs are its memory: each has an
+    smaller is filled up with zeros at the right and below. A larger one is shown in tiles where the settings
+    say so, each with a memory of its own. Further inputs are its memory: each has an
     output of the same shape, in the same order, which is given back with the next window; it begins with
     zeros. An input `elapsed` (1, 1) gets how much time has passed since the window before (s), and at the
     first the length of the window.
@@ -46,6 +49,7 @@ class ModelEventDetector(BinnedDetector):
 
     Attributes:
         description: one line that says what was recognised.
+        hint: one line that says what tiles would do, where the camera is shown smaller than it is; or empty.
 
     Raises:
         ConfigError: a backend that is not installed, or a class that is not known.
@@ -54,6 +58,8 @@ class ModelEventDetector(BinnedDetector):
 
     #: Scans per second where the settings do not say.
     _usual_hz = USUAL_RATE_HZ
+    #: Of its settings.
+    _section = "model_events"
     #: Inputs that are neither windows nor memory.
     _beside: tuple[str, ...] = (ELAPSED,)
 
@@ -74,15 +80,9 @@ class ModelEventDetector(BinnedDetector):
         head = read_onnx_head(path)
         self._input = _window_input(head, self._path)
         bins = (self._input.shape[1] or 0) // 2
-        width, height = size_px
-        self._side = (self._input.shape[3] or width, self._input.shape[2] or height)
-        scale = event_scale(size_px, self._side) if CARD in head.notes else 1.0
-        self._places = EventPlaces(size_px, scale)
-        if any(shown > side for shown, side in zip(self._places.shown_px, self._side, strict=True)):
-            raise DataError(
-                f"takes windows of {self._side[0]} x {self._side[1]} px; the camera has {width} x {height}",
-                path,
-            )
+        self._side = (self._input.shape[3] or size_px[0], self._input.shape[2] or size_px[1])
+        self._places, self._tiling = self._shown(size_px, own=CARD in head.notes)
+        self.hint = self._tiles_hint(size_px)
         ring, rate_hz = EventBins(self._places.shown_px, bins, times.bin_s), times.rate(self._usual_hz)
         super().__init__(size_px, sensor, rate_hz, ring, bins, times)
         self._by_polarity = _by_polarity(self._settings.channels, head)
@@ -90,7 +90,8 @@ class ModelEventDetector(BinnedDetector):
         self._elapsed_input = next((port for port in head.inputs if port.name == ELAPSED), None)
         self._before_s: float | None = None
         self._engine = open_engine(path, head, self._settings.backend, self._settings.threads)
-        self._state: dict[str, npt.NDArray[Any]] = {}
+        self._states: list[dict[str, npt.NDArray[Any]]] = []
+        self._emptied()
         outputs = given_shapes(outputs, lambda: self._engine.run(self._blank(head)))
         self._outputs = OutputReader(outputs, self._side, head.notes, self._settings, self._path, coco=False)
         self._read = [port.name for port in outputs]
@@ -98,7 +99,8 @@ class ModelEventDetector(BinnedDetector):
         order = "polarity" if self._by_polarity else "time"
         self.description = (
             f"{self._path.name}: layout {self._outputs.layout}, windows of {bins} bins of {times.bin_s:g} s "
-            f"by {order} in {self._side[0]} x {self._side[1]} px{_scaled(scale)}{kept}, "
+            f"by {order} in {self._side[0]} x {self._side[1]} px{_scaled(self._places.scale)}"
+            f"{_in_tiles(self._tiling)}{kept}, "
             f"{self._outputs.words}, run by {self._engine.name}"
         )
 
@@ -112,29 +114,30 @@ class ModelEventDetector(BinnedDetector):
         return self._outputs.note()
 
     def _emptied(self) -> None:
-        self._state, self._before_s = {}, None
+        self._states, self._before_s = [{} for _ in range(len(self._tiling))], None
 
     def _next_scan(self) -> Scan:
         return self._scan(self._bins.end_us / _US_PER_S, self._window(), {})
 
     def _window(self) -> npt.NDArray[Any]:
-        """Return the histogram as the network takes it; one of bytes is taken as it is, without a copy."""
+        """Return the histogram as the network takes it, of all tiles; of bytes without a copy."""
         stacked = self._bins.stack(self._by_polarity)[None]
         width, height = self._places.shown_px
-        if (width, height) == self._side:
+        if (width, height) == self._tiling.canvas_px:
             return stacked.astype(self._input.kind, copy=False)
         window = self._empty_window()
         window[:, :, :height, :width] = stacked
         return window
 
     def _empty_window(self) -> npt.NDArray[Any]:
-        shape = (1, self._input.shape[1] or 0, self._side[1], self._side[0])
+        width, height = self._tiling.canvas_px
+        shape = (1, self._input.shape[1] or 0, height, width)
         return np.zeros(shape, dtype=self._input.kind)
 
     def _blank(self, head: OnnxHead) -> dict[str, npt.NDArray[Any]]:
         """Return inputs of nothing, to see what the network gives."""
         width, height = self._side
-        blank = {self._input.name: self._empty_window()}
+        blank = {self._input.name: self._tiling.cut(self._empty_window())[0]}
         for port in head.inputs[1:]:
             sides = [side or 1 for side in port.shape]
             if port.name in self._beside and len(sides) == len(self._input.shape):
@@ -143,17 +146,64 @@ class ModelEventDetector(BinnedDetector):
         return blank
 
     def _scan(self, t: float, window: npt.NDArray[Any], beside: dict[str, npt.NDArray[Any]]) -> Scan:
-        """Run the network on a window that ends at t (s), and on what goes with it."""
-        inputs = {self._input.name: window, **beside, **self._elapsed(t)}
-        for given, _ in self._memory:
-            empty = np.zeros([side or 1 for side in given.shape], dtype=given.kind)
-            inputs[given.name] = self._state.get(given.name, empty)
-        outputs = self._engine.run(inputs)
+        """Run the network on a window that ends at t (s), and on what goes with it, tile by tile."""
+        shared = {**beside, **self._elapsed(t)}
+        seen = {name: value for name, value in shared.items() if value.ndim == window.ndim}
+        tiles = {name: self._tiling.cut(value) for name, value in {self._input.name: window, **seen}.items()}
+        looks = []
+        for k in range(len(self._tiling)):
+            outputs = self._run({**shared, **{name: cut[k] for name, cut in tiles.items()}}, self._states[k])
+            self._states[k] = {given.name: outputs[returned] for given, returned in self._memory}
+            looks.append({name: outputs[name] for name in self._read})
         self._before_s = t
-        self._state = {given.name: outputs[returned] for given, returned in self._memory}
-        found = self._outputs.read({name: outputs[name] for name in self._read})
+        if len(looks) == 1:
+            found = self._outputs.read(looks[0])
+        else:
+            found = self._outputs.together([self._outputs.read_rows(one) for one in looks], self._tiling)
         placed = found._replace(corners=self._places.back(found.corners))
         return scan_within(t, self.sensor, placed, self.size_px)
+
+    def _run(
+        self, inputs: dict[str, npt.NDArray[Any]], state: dict[str, npt.NDArray[Any]]
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Run the network with a state of its memory; what that lacks begins with zeros."""
+        for given, _ in self._memory:
+            empty = np.zeros([side or 1 for side in given.shape], dtype=given.kind)
+            inputs[given.name] = state.get(given.name, empty)
+        return self._engine.run(inputs)
+
+    def _shown(self, size_px: tuple[int, int], *, own: bool) -> tuple[EventPlaces, Tiling]:
+        """Return where a network that `train` made (`own`), or another, sees a camera, and its tiles.
+
+        Raises:
+            DataError: the camera is larger than the input of a network that is shown what the camera sees.
+        """
+        most, fits = self._settings.tiles, letterbox_scale(size_px, self._side) >= 1.0
+        if not own:
+            scale = 1.0
+        elif fits or most == 1:
+            scale = event_scale(size_px, self._side)
+        else:
+            scale = tiled_scale(size_px, self._side, most)
+        places = EventPlaces(size_px, scale)
+        tiling = Tiling(places.shown_px, self._side)
+        if UNLIMITED < most < len(tiling):
+            raise DataError(
+                f"takes windows of {self._side[0]} x {self._side[1]} px; the camera has {size_px[0]} x "
+                f"{size_px[1]}: {self._section}.tiles=0 shows it in {len(tiling)} tiles",
+                self._path,
+            )
+        return places, tiling
+
+    def _tiles_hint(self, size_px: tuple[int, int]) -> str:
+        if self._places.scale >= 1.0:
+            return ""
+        count = len(Tiling(size_px, self._side))
+        return (
+            f"{self._path.name} is shown the camera at {self._places.scale:.3g} of its size; "
+            f"{self._section}.tiles=0 shows it at its own, in {count} tiles that take "
+            f"{count} times as long as one"
+        )
 
     def _elapsed(self, t: float) -> dict[str, npt.NDArray[Any]]:
         """Say how much has passed up to a time (s), if the network takes that."""
@@ -166,6 +216,10 @@ class ModelEventDetector(BinnedDetector):
 
 def _scaled(scale: float) -> str:
     return "" if scale == 1.0 else f" at {scale:.3g} times the camera's"
+
+
+def _in_tiles(tiling: Tiling) -> str:
+    return "" if len(tiling) == 1 else f", {len(tiling)} tiles"
 
 
 def _window_input(head: OnnxHead, path: Path) -> Port:

@@ -83,21 +83,21 @@ def place(frame: RgbImage, side: tuple[int, int], feed: Feed) -> tuple[npt.NDArr
 
 
 def picture_input(
-    frame: RgbImage, side: tuple[int, int], shown_px: tuple[int, int]
+    frame: RgbImage, canvas_px: tuple[int, int], shown_px: tuple[int, int]
 ) -> npt.NDArray[np.float32]:
     """Return a picture (H, W, 3) as (1, 3, height, width) of 0 to 1, filled up at the right and below.
 
     Args:
         frame: the picture.
-        side: width and height of the input (px).
-        shown_px: width and height that the picture is brought to, no larger than `side`.
+        canvas_px: width and height of the input, or of what is cut into tiles for it (px).
+        shown_px: width and height that the picture is brought to, no larger than `canvas_px`.
     """
     import cv2
 
     width, height = shown_px
     if frame.shape[:2] != (height, width):
         frame = np.asarray(cv2.resize(frame, shown_px), dtype=np.uint8)
-    values = np.full((1, 3, side[1], side[0]), _FILL / _WHITE, dtype=np.float32)
+    values = np.full((1, 3, canvas_px[1], canvas_px[0]), _FILL / _WHITE, dtype=np.float32)
     values[0, :, :height, :width] = frame.transpose(2, 0, 1)
     values[0, :, :height, :width] /= _WHITE
     return values

@@ -51,6 +51,7 @@ class FusedDetector(ModelEventDetector):
     """
 
     _usual_hz = BESIDE_RATE_HZ
+    _section = "model_fused"
     _beside = (PICTURE, GIVEN, ELAPSED)
 
     def __init__(
@@ -106,7 +107,8 @@ class FusedDetector(ModelEventDetector):
         if newest is not None:
             self._shown_s, self._shown = newest[0], self._input_of(newest[1])
         if self._shown is None:
-            none = np.zeros((1, 3, self._side[1], self._side[0]), dtype=np.float32)
+            width, height = self._tiling.canvas_px
+            none = np.zeros((1, 3, height, width), dtype=np.float32)
             return {PICTURE: none, GIVEN: _given(picture=False, age_s=0.0, events=True)}
         age_s = max(t - self._shown_s, 0.0)
         return {PICTURE: self._shown, GIVEN: _given(picture=True, age_s=age_s, events=True)}
@@ -118,7 +120,7 @@ class FusedDetector(ModelEventDetector):
                 f"a picture has {width} x {height} px, the events {self.size_px[0]} x {self.size_px[1]}: a "
                 "network of both needs pictures and events of the same pixels"
             )
-        return picture_input(frame, self._side, self._places.shown_px)
+        return picture_input(frame, self._tiling.canvas_px, self._places.shown_px)
 
 
 def _given(*, picture: bool, age_s: float, events: bool) -> npt.NDArray[np.float32]:

@@ -94,6 +94,15 @@ class ModelSettings(Section):
         1.0,
     )
 
+    tiles: int = number(
+        1,
+        "1",
+        "a picture larger than the network's input is shown in at most so many tiles, which overlap, at its "
+        "own size if they suffice; each takes as long as a whole one; 0: as many as that needs; 1: as a "
+        "whole, made smaller",
+        0,
+        64,
+    )
     noise_filter: bool = flag(
         False,
         "whether a network of events is spared those that stand alone, and hot pixels (events.noise); most "

@@ -25,6 +25,7 @@ from jeat_graph.detection.models.layouts.registry import decode, shapes_of
 from jeat_graph.detection.models.model_settings import AUTO, ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, Port
 from jeat_graph.detection.models.recognising import layout_of, network_of
+from jeat_graph.detection.models.tiling import TileBoxes, Tiling
 
 # Of a picture's boxes so many may be without numbers; where more are, the others cannot be trusted either.
 _MOST_WITHOUT = 0.5
@@ -87,6 +88,7 @@ class OutputReader:
         names = class_names(notes)
         count = self._channels or (len(names) or None)
         self._scans, self._scans_without, self.no_numbers = 0, 0, 0
+        self._looks = "scans"
         known = known_names(names, count if coco else None)
         self._wanted, self.words = wanted_classes(settings.classes, count if names or coco else None, names)
         self._names = None if says_nothing(known, count) else known
@@ -96,6 +98,32 @@ class OutputReader:
 
     def read(self, outputs: dict[str, npt.NDArray[Any]]) -> FoundBoxes:
         """Return what is to be kept: its corners are in the network's input (px).
+
+        Raises:
+            DataError: as `read_rows`.
+        """
+        return self.named(self.read_rows(outputs))
+
+    def named(self, found: TileBoxes) -> FoundBoxes:
+        """Return boxes with the names of their classes."""
+        return FoundBoxes(found.corners, found.scores, self._named(found.classes))
+
+    def together(self, found: list[TileBoxes], tiling: Tiling) -> FoundBoxes:
+        """Return what the tiles of a picture show, by the rules of one look: corners in its canvas (px).
+
+        Args:
+            found: what `read_rows` returned of each tile, in px of the tile.
+            tiling: where the tiles lie.
+        """
+        self._looks = "looks at tiles"
+        _, overlap, _, _, _ = self._rules
+        corners, scores, classes = tiling.together(found, overlap)
+        # A network that has distinguished its boxes has done so in each tile for itself.
+        rows = DecodedBoxes(corners, scores, classes, distinct=False)
+        return self.named(TileBoxes(*choose(rows, None, *self._rules)))
+
+    def read_rows(self, outputs: dict[str, npt.NDArray[Any]]) -> TileBoxes:
+        """Return what is to be kept of one look, classes as numbers: its corners are in the input (px).
 
         Boxes without numbers are left out and counted.
 
@@ -110,8 +138,7 @@ class OutputReader:
             found = decode(self.layout, outputs, self._side, self._channels)
         except DataError as error:
             raise DataError(str(error), self._path) from None
-        corners, scores, classes = choose(self._with_numbers(found), self._wanted, *self._rules)
-        return FoundBoxes(corners, scores, self._named(classes))
+        return TileBoxes(*choose(self._with_numbers(found), self._wanted, *self._rules))
 
     def _check_shapes(self, outputs: Mapping[str, npt.NDArray[Any]]) -> None:
         """Refuse a network whose first outputs are of another layout than what its file declares."""
@@ -144,7 +171,7 @@ class OutputReader:
         """Say how many boxes were left out because they had no numbers; empty if none were."""
         if not self.no_numbers:
             return ""
-        where = f"in {self._scans_without} of {self._scans} scans"
+        where = f"in {self._scans_without} of {self._scans} {self._looks}"
         return f"{self._path}: {self.no_numbers} boxes had no numbers (NaN or infinite), {where}: left out"
 
     def _with_numbers(self, found: DecodedBoxes) -> DecodedBoxes:
