@@ -11,7 +11,19 @@ constexpr std::int64_t swapped(std::uint32_t word) {
                                      (word >> 24));
 }
 
-// Decodes words until they, or the room, end; returns how many were used. `davis`: else a DVS128.
+// What an address says. `davis`: of a DAVIS, else of a DVS128.
+struct Address {
+    bool special;  // an edge of an external signal, no event
+    std::int64_t x, y, polarity;
+};
+template <bool davis> constexpr Address address_of(std::int64_t word) {
+    if constexpr (davis)
+        return {(word >> 10 & 1) != 0, word >> 12 & 0x3FF, word >> 22 & 0x1FF, word >> 11 & 1};
+    else
+        return {(word >> 15 & 1) != 0, word >> 1 & 0x7F, word >> 8 & 0x7F, 1 - (word & 1)};
+}
+
+// Decodes words until they, or the room, end; returns how many were used.
 template <bool davis> std::size_t decode(std::span<const std::uint64_t> words, DecoderState& state, const Columns& out,
                                          const Triggers& triggers, const Limits& limits) {
     auto n = static_cast<std::size_t>(state.filled), m = static_cast<std::size_t>(state.triggers);
@@ -19,17 +31,14 @@ template <bool davis> std::size_t decode(std::span<const std::uint64_t> words, D
     std::int64_t time = turns << CLOCK_BITS;
     std::size_t used = words.size();
     for (std::size_t k = 0; k < words.size(); ++k) {
-        const std::int64_t address = swapped(static_cast<std::uint32_t>(words[k]));
+        const std::int64_t word = swapped(static_cast<std::uint32_t>(words[k]));
         const std::int64_t now = swapped(static_cast<std::uint32_t>(words[k] >> 32));
-        if (davis && address >> 31) continue;
-        const bool special = ((davis ? address >> 10 : address >> 15) & 1) != 0;
+        if (davis && word >> 31) continue;
         if (n == out.t.size() || m == triggers.t.size()) {
             used = k;
             break;
         }
-        const std::int64_t x = davis ? (address >> 12) & 0x3FF : (address >> 1) & 0x7F;
-        const std::int64_t y = davis ? (address >> 22) & 0x1FF : (address >> 8) & 0x7F;
-        const std::int64_t polarity = davis ? (address >> 11) & 1 : 1 - (address & 1);
+        const auto [special, x, y, polarity] = address_of<davis>(word);
         if (!special && !is_kept(x, y, true, limits, state)) continue;
         if (!(low <= now && now <= low + JUMP_US)) {
             turns = turns_of_clock(now, low, turns, state);

@@ -7,27 +7,13 @@
 
 #include "events/decoding.hpp"
 #include "events/evt3_block.hpp"
+#include "events/evt3_groups.hpp"
 #include "wide.hpp"
 
 namespace jeat::events::evt3 {
 
 inline constexpr int HIGH_BITS = 12, LOW_BITS = 12;
 inline constexpr std::int64_t SIDE = 0x7FF, BITS = 0xFFF;
-
-// Which columns the bits of a byte stand for, in order, and how many they are: without a branch for each bit.
-struct ColumnsOfBits {
-    std::array<std::array<std::uint16_t, 8>, 256> column{};
-    std::array<std::uint8_t, 256> count{};
-
-    constexpr ColumnsOfBits() {
-        for (unsigned bits = 0; bits < 256; ++bits) {
-            for (unsigned k = 0; k < 8; ++k) {
-                if (bits >> k & 1) column[bits][count[bits]++] = static_cast<std::uint16_t>(k);
-            }
-        }
-    }
-};
-inline constexpr ColumnsOfBits COLUMNS_OF_BITS;
 
 // What leap from `high` the time of word `k` is, by the next time.
 inline Leap leap_of(std::span<const std::uint16_t> words, std::size_t k, std::int64_t high, DecoderState& state) {
@@ -167,101 +153,79 @@ private:
         return end < BLOCK_WORDS ? (std::uint64_t{1} << end) - 1 : ~std::uint64_t{0};
     }
 
-    // Writes eight rows, of which as many count as there are bits: the caller has seen to the room.
-    static std::size_t put_eight(const Columns& out, std::size_t n, unsigned bits, std::int64_t time,
-                                 std::int64_t first, std::int64_t row, std::int64_t polarity) {
-        const auto& columns = COLUMNS_OF_BITS.column[bits];
-        std::int64_t* t = out.t.data() + n;
-        std::uint16_t *x = out.x.data() + n, *y = out.y.data() + n;
-        std::uint8_t* p = out.p.data() + n;
-        const auto from = static_cast<std::uint16_t>(first), line = static_cast<std::uint16_t>(row);
-        const auto sign = static_cast<std::uint8_t>(polarity);
-        std::array<std::uint16_t, 8> place;
-        for (int k = 0; k < 8; ++k) place[k] = static_cast<std::uint16_t>(from + columns[k]);
-        for (int k = 0; k < 8; ++k) t[k] = time;
-        for (int k = 0; k < 8; ++k) x[k] = place[k];
-        for (int k = 0; k < 8; ++k) y[k] = line;
-        for (int k = 0; k < 8; ++k) p[k] = sign;
-        return n + COLUMNS_OF_BITS.count[bits];
-    }
-
-    // Writes those events of a group that lie in the picture, and returns the next row.
-    static std::size_t put_inside(const Columns& out, std::size_t n, unsigned bits, std::int64_t t, std::int64_t first,
-                                  std::int64_t row, std::int64_t polarity, const Limits& limits) {
-        for (; bits != 0; bits &= bits - 1) {
-            const std::int64_t x = first + std::countr_zero(bits);
-            if (x < limits.width && row < limits.height) put_event(out, n++, t, x, row, polarity);
-        }
-        return n;
-    }
-
     // Takes any word; false where it must wait for room or for more words.
     bool take(std::span<const std::uint16_t> words, std::size_t k) {
         const std::int64_t word = words[k];
         switch (word >> 12) {
             case EVENT:
-                if (full()) return false;
-                put(1, word & SIDE, word >> 11 & 1);
-                break;
+                return put(1, word & SIDE, word >> 11 & 1);
             case ROW:
                 row_ = word & SIDE;
-                break;
+                return true;
             case TIME_LOW:
-                leave_time();
-                low_ = word & BITS;
-                time_ = time();
-                if (high_ >= 0) enter_time();
-                break;
+                take_low(word & BITS);
+                return true;
             case FIRST:
                 base_ = word & SIDE;
                 polarity_ = word >> 11 & 1;
-                break;
+                return true;
             case GROUP_12:
-                if (full()) return false;
-                put_group(word, 12);
-                break;
+                return put_group(word, 12);
             case GROUP_8:
-                if (full()) return false;
-                put_group(word, 8);
-                break;
+                return put_group(word, 8);
             case TIME_HIGH:
                 return (word & BITS) == high_ || take_high(words, k);
             case TRIGGER:
-                if (high_ < 0) {
-                    ++state_.untimed;
-                    break;
-                }
-                if (m_ == triggers_.t.size()) return false;
-                put_edge(triggers_, m_++, time_, word >> 8 & 0xF, word & 1);
-                break;
+                return take_edge(word);
             case CONTINUED_4:
             case OTHERS:
             case OTHERS + 1:
-                break;
+                return true;
             default:
                 ++state_.unknown;
+                return true;
         }
-        return true;
     }
 
     std::int64_t time() const { return (((turns_ << HIGH_BITS) + high_) << LOW_BITS) + low_; }
     bool full() const { return n_ + MOST_OF_A_WORD > out_.t.size(); }
 
-    // Writes events of a row, a bit each from the column `first` on, and counts those that are left out.
-    void put(unsigned bits, std::int64_t first, std::int64_t polarity) {
+    // Writes events of a row, a bit each from the column `first` on, and counts those that are left out; false where
+    // there is no room.
+    bool put(unsigned bits, std::int64_t first, std::int64_t polarity) {
+        if (full()) return false;
         const auto count = static_cast<std::int64_t>(std::popcount(bits));
         if (high_ < 0 || row_ < 0) {
             state_.untimed += count;
-            return;
+            return true;
         }
         const std::size_t end = put_inside(out_, n_, bits, last_, first, row_, polarity, limits_);
         state_.outside += count - static_cast<std::int64_t>(end - n_);
         n_ = end;
+        return true;
     }
 
-    void put_group(std::int64_t word, int width) {
-        put(static_cast<unsigned>(word & ((1 << width) - 1)), base_, polarity_);
+    bool put_group(std::int64_t word, int width) {
+        if (!put(static_cast<unsigned>(word & ((1 << width) - 1)), base_, polarity_)) return false;
         base_ += width;
+        return true;
+    }
+
+    bool take_edge(std::int64_t word) {
+        if (high_ < 0) {
+            ++state_.untimed;
+            return true;
+        }
+        if (m_ == triggers_.t.size()) return false;
+        put_edge(triggers_, m_++, time_, word >> 8 & 0xF, word & 1);
+        return true;
+    }
+
+    void take_low(std::int64_t low) {
+        leave_time();
+        low_ = low;
+        time_ = time();
+        if (high_ >= 0) enter_time();
     }
 
     // Takes a new value of the time's upper bits; false where more words must come before it is understood.

@@ -109,59 +109,93 @@ struct Pair {
     View2<double> out;
 };
 
+namespace detail {
+
+// The state at a time between the two of a pair.
+struct Between {
+    explicit Between(std::size_t errors)
+        : n(MOTION + errors), wide(n + SIZES + 1), state(n, wide), P(n, n), seen(n), row(wide) {
+        for (std::size_t j = 0; j < n; ++j) state[j][j] = 1.0;
+    }
+
+    std::size_t n, wide;
+    Matrix state;                   // each component, by the first state, the size, and a constant
+    Matrix P;                       // covariance
+    std::vector<double> seen, row;  // room for a row
+};
+
+// What one number of a box says: slopes J on its place and size, and h on the persisting error of its channel.
+struct Measurement {
+    const double* J;
+    std::size_t error;
+    double h, variance, right;
+};
+
+// Writes the row of a number, and conditions the state on it. Returns its variance before.
+inline double condition(const Measurement& z, Between& now, double* out) {
+    auto& [n, wide, state, P, seen, row] = now;
+    const double* const J = z.J;
+    const std::size_t constant = wide - 1;
+    // The row H of a box: on the two places, and on the persisting error of this channel of its sensor.
+    for (std::size_t r = 0; r < n; ++r) seen[r] = P[r][0] * J[0] + P[r][AXIS] * J[1] + P[r][z.error] * z.h;
+    for (std::size_t q = 0; q < wide; ++q)
+        row[q] = state[0][q] * J[0] + state[AXIS][q] * J[1] + state[z.error][q] * z.h;
+    for (std::size_t j = 0; j < SIZES; ++j) row[n + j] += J[2 + j];
+    row[constant] = z.right - row[constant];
+    const double S = seen[0] * J[0] + seen[AXIS] * J[1] + seen[z.error] * z.h + z.variance;
+    const double root = 1.0 / std::sqrt(S);
+    for (std::size_t q = 0; q < n; ++q) out[q] = root * row[q];
+    for (std::size_t q = n; q < wide; ++q) out[n + q] = root * row[q];
+    for (std::size_t j = 0; j < n; ++j) {
+        const double gain = seen[j] / S;
+        for (std::size_t q = 0; q < constant; ++q) state[j][q] -= gain * row[q];
+        state[j][constant] += gain * row[constant];
+        for (std::size_t q = 0; q < n; ++q) P[j][q] -= gain * seen[q];
+    }
+    return S;
+}
+
+// Writes the rows that tie the second state to what the first one and the boxes say of it: P becomes its root.
+inline void tie(Between& now, View2<double> to) {
+    auto& [n, wide, state, P, seen, row] = now;
+    const std::size_t constant = wide - 1;
+    cholesky(P);
+    Matrix W(n, n);
+    for (std::size_t j = 0; j < n; ++j) W[j][j] = 1.0;
+    solve_lower(P, W);
+    solve_lower(P, state);
+    for (std::size_t r = 0; r < n; ++r) {
+        double* const out = to[r];
+        for (std::size_t q = 0; q < n; ++q) out[q] = -state[r][q], out[n + q] = W[r][q];
+        for (std::size_t q = n; q < constant; ++q) out[n + q] = -state[r][q];
+        out[n + constant] = state[r][constant];
+    }
+}
+
+}  // namespace detail
+
 // Fills the rows of one pair. Returns how many they are, and ln of the determinant of their covariance.
 inline std::pair<std::size_t, double> pair_rows(const Pair& pair, const Boxes& boxes, const double* slopes,
                                                 View2<const double> right, std::span<const double> jerk) {
-    const std::size_t n = MOTION + CHANNELS * boxes.memory_s.size(), wide = n + SIZES + 1, constant = wide - 1;
-    // Each component of the state now, by the first state, the size, and a constant; then its covariance.
-    Matrix state(n, wide), P(n, n);
-    for (std::size_t j = 0; j < n; ++j) state[j][j] = 1.0;
-    std::vector<double> seen(n), row(wide);
+    detail::Between now(CHANNELS * boxes.memory_s.size());
     double t = pair.start, log_determinant = 0.0;
-    std::size_t place = n;
+    std::size_t place = now.n;
     for (std::size_t k = pair.first; k < pair.last; ++k) {
         if (boxes.t[k] > t) {
-            detail::step(boxes.t[k] - t, jerk, boxes.memory_s, state, P);
+            detail::step(boxes.t[k] - t, jerk, boxes.memory_s, now.state, now.P);
             t = boxes.t[k];
         }
         for (std::size_t channel = 0; channel < CHANNELS; ++channel) {
             if (!measured(boxes.mode[k], channel)) continue;
-            const double* const J = slopes + (k * CHANNELS + channel) * UNKNOWNS;
-            // The row H of a box: on the two places, and on the persisting error of this channel of its sensor.
-            const std::size_t error = MOTION + CHANNELS * static_cast<std::size_t>(boxes.group[k]) + channel;
-            const double h = boxes.coloured[k][channel];
-            for (std::size_t r = 0; r < n; ++r) seen[r] = P[r][0] * J[0] + P[r][AXIS] * J[1] + P[r][error] * h;
-            for (std::size_t q = 0; q < wide; ++q)
-                row[q] = state[0][q] * J[0] + state[AXIS][q] * J[1] + state[error][q] * h;
-            for (std::size_t j = 0; j < SIZES; ++j) row[n + j] += J[2 + j];
-            row[constant] = right[k][channel] - row[constant];
-            const double S = seen[0] * J[0] + seen[AXIS] * J[1] + seen[error] * h + boxes.new_variance(k, channel);
-            const double root = 1.0 / std::sqrt(S);
-            double* const out = pair.out[place++];
-            for (std::size_t q = 0; q < n; ++q) out[q] = root * row[q];
-            for (std::size_t q = n; q < wide; ++q) out[n + q] = root * row[q];
-            log_determinant += log_of(S);
-            for (std::size_t j = 0; j < n; ++j) {
-                const double gain = seen[j] / S;
-                for (std::size_t q = 0; q < constant; ++q) state[j][q] -= gain * row[q];
-                state[j][constant] += gain * row[constant];
-                for (std::size_t q = 0; q < n; ++q) P[j][q] -= gain * seen[q];
-            }
+            const detail::Measurement z{slopes + (k * CHANNELS + channel) * UNKNOWNS,
+                                        MOTION + CHANNELS * static_cast<std::size_t>(boxes.group[k]) + channel,
+                                        boxes.coloured[k][channel], boxes.new_variance(k, channel), right[k][channel]};
+            log_determinant += log_of(detail::condition(z, now, pair.out[place++]));
         }
     }
-    detail::step(pair.end - t, jerk, boxes.memory_s, state, P);
-    detail::cholesky(P);
-    Matrix W(n, n);
-    for (std::size_t j = 0; j < n; ++j) W[j][j] = 1.0;
-    detail::solve_lower(P, W);
-    detail::solve_lower(P, state);
-    for (std::size_t r = 0; r < n; ++r) {
-        double* const out = pair.out[r];
-        for (std::size_t q = 0; q < n; ++q) out[q] = -state[r][q], out[n + q] = W[r][q];
-        for (std::size_t q = n; q < constant; ++q) out[n + q] = -state[r][q];
-        out[n + constant] = state[r][constant];
-        log_determinant += 2.0 * log_of(P[r][r]);
-    }
+    detail::step(pair.end - t, jerk, boxes.memory_s, now.state, now.P);
+    detail::tie(now, pair.out);
+    for (std::size_t r = 0; r < now.n; ++r) log_determinant += 2.0 * log_of(now.P[r][r]);
     return {place, log_determinant};
 }
 
