@@ -3,7 +3,7 @@
 A link's gain is ln of the ratio of two stories: head continues tail after a gap of length u, or tail leaves
 and head is born,
 
-    ln p(joined)/p(apart) + votes + ln f(u) − ln λ/α − ln p_exit + likeness
+    ln p(joined)/p(apart) + votes + ln f(u) − ln λ/α − ln p_exit + similarity
 
 λ is the rate of births (a time step) and p_exit the probability that a piece's object leaves, each apart for
 the picture's interior and its rim, α the share of the picture; f is the density of gaps, most of them none,
@@ -93,7 +93,7 @@ def join(
     span: tuple[float, float],
     step_s: float,
     past: Past | None = None,
-    likeness: FloatArray | None = None,
+    similarity: FloatArray | None = None,
 ) -> Joined:
     """Find the best cover of pieces.
 
@@ -104,7 +104,7 @@ def join(
         span: first and last time of the recording (s).
         step_s: time from one scan to the next (s).
         past: what was decided before, of other pieces.
-        likeness: (E,) ln of the ratio that appearance gives each; None where nothing is known of it.
+        similarity: (E,) ln of the ratio that appearance gives each; None where nothing is known of it.
     """
     before = Past.none() if past is None else past
     u = pieces.begins[possible.head] - pieces.ends[possible.tail]
@@ -116,8 +116,8 @@ def join(
     cover = np.full(len(pieces.begins), -1, dtype=np.int64)
     links, terms = possible, np.zeros((len(u), len(TERMS)))
     terms[:, 0], terms[:, 1] = possible.gain, VOTES * votes
-    if likeness is not None:
-        terms[:, 5] = likeness
+    if similarity is not None:
+        terms[:, 5] = similarity
     for _ in range(_ROUNDS):
         terms[:, 2] = np.log(gap_density(u, median, step_s))
         terms[:, 3] = -np.log(births / _AREA)[born[possible.head]]

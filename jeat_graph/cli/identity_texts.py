@@ -60,7 +60,7 @@ def _text_of_links(links: IdentityLinks) -> list[str]:
 def _text_of_link(links: IdentityLinks, k: int) -> str:
     tail, head = int(links.tail[k]), int(links.head[k])
     who = f"joins {tail} to {head}" if tail != head else f"keeps {tail} together"
-    terms = ", ".join(f"{name} {values[k]:+.1f}" for name, values in links.told_terms().items())
+    terms = ", ".join(f"{name} {values[k]:+.1f}" for name, values in links.shown_terms().items())
     return (
         f"a link {who} over {links.t_head[k] - links.t_tail[k]:.3f} s ({links.t_tail[k]:.3f} to "
         f"{links.t_head[k]:.3f} s): probability {links.probability[k]:.2f}, log ratio "

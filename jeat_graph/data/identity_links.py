@@ -31,7 +31,7 @@ class IdentityLinks(NamedTuple):
     probability: FloatArray
     terms: FloatArray
 
-    def told_terms(self) -> dict[str, FloatArray]:
+    def shown_terms(self) -> dict[str, FloatArray]:
         """Return the terms (K,) by name; that of appearance only where it tells something."""
         *usual, appearance = zip(TERMS, self.terms.T, strict=True)
         return dict([*usual, appearance] if appearance[1].any() else usual)

@@ -87,7 +87,7 @@ def test_core_and_reference_agree_on_heaps(constants):
 
 
 @pytest.mark.parametrize("preset", ["default", "paper"])
-def test_thousands_of_boxes_on_one_spot_are_told_of_once_and_cost_no_more_than_some(preset, tmp_path):
+def test_thousands_of_boxes_on_one_spot_are_warned_of_once_and_cost_no_more_than_some(preset, tmp_path):
     tracker = Tracker(preset, image=(1280, 720))
     rng, count = np.random.default_rng(0), 3000
     with warnings.catch_warnings(record=True) as told:

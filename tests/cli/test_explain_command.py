@@ -29,7 +29,7 @@ def explained(folder, capsys, *arguments: str) -> str:
     return capsys.readouterr().out
 
 
-def test_a_car_is_reported_because_of_its_scores_and_looks(folder, capsys):
+def test_a_car_is_reported_because_of_its_scores_and_detections(folder, capsys):
     text = explained(folder, capsys, "--track", "1")
     assert "track 1: from 0.000 to 2.900 s" in text
     assert "reported first at" in text

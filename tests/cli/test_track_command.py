@@ -194,7 +194,7 @@ def test_boxes_without_area_are_counted(write, tmp_path, capsys):
     assert "1 box(es) without area left out" in capsys.readouterr().err
 
 
-def test_boxes_of_another_picture_are_told_of_with_their_extent(write, tmp_path, capsys):
+def test_boxes_of_another_picture_are_warned_of_with_their_extent(write, tmp_path, capsys):
     lines = [f"{k * 0.05:.2f},rgb,{1500 + k},800,40,30,0.9" for k in range(20)]
     assert main(["track", write(*lines), "--out", str(tmp_path / "run"), *KNOWN]) == 0
     message = capsys.readouterr().err

@@ -72,15 +72,15 @@ def dense(tmp_path_factory):
     return found
 
 
-def dressed(dense, likeness):
-    """The gap with embeddings; the cosine of one vehicle at both is about `likeness`, that of two about 0."""
+def dressed(dense, similarity):
+    """The gap with embeddings; the cosine of one vehicle at both is about `similarity`, that of two about 0."""
     rng = np.random.default_rng(7)
     own = rng.normal(size=(2000, NUMBERS))
     out = []
     for passages, vehicle in dense:
         noise = rng.normal(size=(len(vehicle), NUMBERS))
         known = np.where(vehicle[:, None] >= 0, own[vehicle], rng.normal(size=noise.shape))
-        appearance = np.sqrt(likeness) * known + np.sqrt(1.0 - likeness) * noise
+        appearance = np.sqrt(similarity) * known + np.sqrt(1.0 - similarity) * noise
         out.append(replace(passages, appearance=appearance + 0.3))
     return Gap.of(*out)
 
@@ -96,7 +96,7 @@ def solved(gap):
     return solve(KnownGap("A", "B", 500.0, 5.0), gap)
 
 
-def test_looks_of_known_worth_are_learnt_and_help(dense):
+def test_appearance_of_known_value_is_learnt_and_helps(dense):
     gap = dressed(dense, 0.45)
     cosine = gap.appearance[0] @ gap.appearance[1].T
     same = (dense[0][1][:, None] == dense[1][1][None]) & (dense[0][1][:, None] >= 0)
@@ -109,14 +109,14 @@ def test_looks_of_known_worth_are_learnt_and_help(dense):
     assert f1_of(over, dense) > f1_of(plain, dense) + 0.015
 
 
-def test_looks_that_tell_nothing_change_nothing(dense):
+def test_appearance_that_tells_nothing_changes_nothing(dense):
     over, plain = solved(dressed(dense, 0.0)), solved(Gap.of(dense[0][0], dense[1][0]))
     appearance = over.fitted.parameters.appearance
     assert appearance is None or appearance.d_prime < 0.3
     assert f1_of(over, dense) == pytest.approx(f1_of(plain, dense), abs=0.01)
 
 
-def test_a_track_looks_like_the_detections_it_took():
+def test_the_appearance_of_a_track_is_that_of_its_detections():
     boxes = np.array([[0.0, 0, 10, 10], [50, 0, 10, 10]])
     t = np.repeat([0.0, 0.1], 2)
     appearance = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])

@@ -24,13 +24,13 @@ from jeat_graph_sehn.simulation.corridor.cameras import CameraErrors, write_seen
 from jeat_graph_sehn.simulation.corridor.traffic import CorridorTraffic
 from jeat_graph_sehn.simulation.corridor.writing import simulate_corridor
 
-NUMBERS, LIKENESS, GAP_M = 16, 0.45, 800.0
+NUMBERS, SIMILARITY, GAP_M = 16, 0.45, 800.0
 EVERY_S = 5.0
 
 
 @pytest.fixture(scope="module")
 def days(tmp_path_factory):
-    """Two days of one dense road, one to learn from: passages with looks, and true vehicles, of A and B."""
+    """Two days of one dense road, one to learn from: passages with appearance, and true vehicles, of A and B."""
     found = []
     for seed in (1, 2):
         traffic = CorridorTraffic(400.0, 2400.0, 110.0, (0.0, GAP_M), 0.04, 0.04)
@@ -44,20 +44,20 @@ def days(tmp_path_factory):
             vehicle = one.vehicle[passages.track_id - 1]
             noise = rng.normal(size=(len(vehicle), NUMBERS))
             known = np.where(vehicle[:, None] >= 0, own[vehicle], rng.normal(size=noise.shape))
-            looks = np.sqrt(LIKENESS) * known + np.sqrt(1.0 - LIKENESS) * noise
+            appearance = np.sqrt(SIMILARITY) * known + np.sqrt(1.0 - SIMILARITY) * noise
             # What each camera does to all of its vehicles.
-            looks = looks + rng.normal(scale=0.5, size=NUMBERS)
-            cameras.append((replace(passages, appearance=looks), vehicle))
+            appearance = appearance + rng.normal(scale=0.5, size=NUMBERS)
+            cameras.append((replace(passages, appearance=appearance), vehicle))
         found.append(cameras)
     return found
 
 
 @pytest.fixture(scope="module")
 def learnt(days, tmp_path_factory):
-    """The gap as a file has it, with looks and without: the paths."""
+    """The gap as a file has it, with appearance and without: the paths."""
     out = []
-    for looks in (True, False):
-        a, b = (one if looks else replace(one, appearance=None) for one, _ in days[0])
+    for appearance in (True, False):
+        a, b = (one if appearance else replace(one, appearance=None) for one, _ in days[0])
         over = solve(KnownGap("A", "B", GAP_M, 8.0), Gap.of(a, b))
         path = tmp_path_factory.mktemp("learnt") / "corridor.yaml"
         write_corridor(Corridor.of(["A", "B"], {"A": a, "B": b}, [over]), path)
@@ -74,13 +74,13 @@ def gaps_of(path, day):
     ]
 
 
-def drive(live, day, offset, *, looks=True, until=np.inf, since=-np.inf):
+def drive(live, day, offset, *, appearance=True, until=np.inf, since=-np.inf):
     """Send a day's passages in order of true time; the pairs (track at A, track at B) that are found."""
     rows = []
     for name, (p, _), clock in zip("AB", day, (0.0, offset), strict=True):
         for k in range(len(p)):
             numbers = (p.t[k], p.sigma_t[k], p.log_speed[k], p.sigma_speed[k])
-            packed = packed_embedding(p.appearance[k]) if looks else ""
+            packed = packed_embedding(p.appearance[k]) if appearance else ""
             one = LivePassage(
                 int(p.track_id[k]), *map(float, numbers), p.lanes[p.lane[k]], p.kinds[p.kind[k]], packed
             )
@@ -111,13 +111,13 @@ def f1(pairs, day):
     return 2.0 * sum(who[0][i] == who[1][j] >= 0 for i, j in pairs) / (len(pairs) + common)
 
 
-def followed(path, day, looks=True):
+def followed(path, day, appearance=True):
     gaps = gaps_of(path, day)
     live = LiveCorridor(gaps, 300.0)
-    return drive(live, day, gaps[0].parameters.offset_s, looks=looks), live
+    return drive(live, day, gaps[0].parameters.offset_s, appearance=appearance), live
 
 
-def test_looks_help_while_vehicles_drive(days, learnt):
+def test_appearance_helps_while_vehicles_drive(days, learnt):
     with_looks, live = followed(learnt[0], days[1])
     without, plain = followed(learnt[1], days[1])
     assert f1(with_looks, days[1]) > f1(without, days[1]) + 0.03
@@ -125,18 +125,18 @@ def test_looks_help_while_vehicles_drive(days, learnt):
     assert plain.shown()["gaps"][0]["d_prime"] is None
 
 
-def test_looks_that_do_not_come_change_nothing(days, learnt):
+def test_appearance_that_does_not_come_changes_nothing(days, learnt):
     """A corridor that was learnt with them, and a camera without an embedder."""
     gaps = gaps_of(learnt[0], days[1])
     plain = [replace(gap, parameters=replace(gap.parameters, appearance=None), numbers=0) for gap in gaps]
     found = [
-        drive(LiveCorridor(one, 300.0), days[1], gaps[0].parameters.offset_s, looks=False)
+        drive(LiveCorridor(one, 300.0), days[1], gaps[0].parameters.offset_s, appearance=False)
         for one in (gaps, plain)
     ]
     assert found[0] == found[1]
 
 
-def test_a_file_has_what_was_learnt_of_looks_only_where_something_was(learnt):
+def test_a_file_has_what_was_learnt_of_appearance_only_where_something_was(learnt):
     with_looks, without = (read_learnt_gaps(path)[0] for path in learnt)
     assert with_looks.numbers == NUMBERS
     assert with_looks.parameters.appearance.d_prime == pytest.approx(2.0, abs=0.5)
@@ -148,7 +148,7 @@ def test_a_file_has_what_was_learnt_of_looks_only_where_something_was(learnt):
 @pytest.mark.parametrize(
     ("old", "new"), [("sigma: ", "sigma: -"), ("numbers: 16", "numbers: 0"), ("same:", "x:")]
 )
-def test_a_file_with_damaged_looks_is_refused(old, new, learnt, tmp_path):
+def test_a_file_with_damaged_appearance_is_refused(old, new, learnt, tmp_path):
     text = learnt[0].read_text()
     assert old in text
     (tmp_path / "c.yaml").write_text(text.replace(old, new))
@@ -156,7 +156,7 @@ def test_a_file_with_damaged_looks_is_refused(old, new, learnt, tmp_path):
         read_learnt_gaps(tmp_path / "c.yaml")
 
 
-def test_embeddings_of_another_network_are_told_of_and_not_compared(days, learnt):
+def test_embeddings_of_another_network_are_warned_of_and_not_compared(days, learnt):
     shorter = [(replace(p, appearance=p.appearance[:, :5]), v) for p, v in days[1]]
     gaps = gaps_of(learnt[1], days[1])
     live = LiveCorridor(

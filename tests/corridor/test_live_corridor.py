@@ -116,7 +116,7 @@ def test_every_way_ends_once(events, drive):
     assert shown["problems"] == []
 
 
-def test_a_state_goes_on_where_it_was_and_who_is_told_again_counts_once(through, drive, events):
+def test_a_state_goes_on_where_it_was_and_who_is_reported_again_counts_once(through, drive, events):
     gaps = read_learnt_gaps(through / "corridor.yaml")
     stop, first = 80.0, LiveCorridor(gaps, 150.0)
     found = follow(first, drive, until=stop)
@@ -136,7 +136,7 @@ def test_a_camera_that_is_silent_for_a_while_costs_nobody(road, through, drive, 
     assert f1(links_of(found), road) > f1(links_of(events[0]), road) - 0.02
 
 
-def test_clocks_that_disagree_are_told_of(through, drive):
+def test_clocks_that_disagree_are_warned_of(through, drive):
     live = LiveCorridor(read_learnt_gaps(through / "corridor.yaml"), 150.0)
     shifted = [(t, name, one._replace(t=one.t + (20.0 if name == "B" else 0.0))) for t, name, one in drive[1]]
     follow(live, (drive[0], shifted), until=250.0)

@@ -95,7 +95,7 @@ def test_far_boxes_weigh_as_students_t_says():
 
 @pytest.mark.parametrize("side", range(4), ids=["left", "top", "right", "bottom"])
 @pytest.mark.parametrize("left_over", [0.6, 0.5, 0.4, 0.3])
-def test_a_cut_side_is_told_and_hardly_measures(side, left_over):
+def test_a_cut_side_is_recognised_and_hardly_measures(side, left_over):
     mean, covariance = tracked()
     box, axis, end = BOX.copy(), side % 2, side // 2
     extent = BOX[0, 2 + axis] - BOX[0, axis]
@@ -156,7 +156,7 @@ def test_probabilities_of_a_cut_are_bayes_rule():
 # Sides at the edge of the picture.
 
 
-def test_sides_at_the_edge_and_boxes_beyond_it_are_told_apart():
+def test_sides_at_the_edge_and_boxes_beyond_it_are_distinguished():
     boxes = np.array(
         [[0.0, 9.0, 50.0, 90.0], [9.0, 9.0, 638.0, 479.0], [9.0, 9.0, 50.0, 90.0], [-9.0, 9.0, 50.0, 90.0]]
     )

@@ -134,7 +134,7 @@ def test_errors_of_centre_and_size_are_those_of_two_sides():
 
 
 @pytest.mark.parametrize("depth", [8.0, 60.0])
-def test_told_acceleration_is_the_second_derivative_of_the_image(depth):
+def test_reported_acceleration_is_the_second_derivative_of_the_image(depth):
     """A point X at Ẋ, at depth Z with Ż, has the image x = X/Z: ẍ = −2 Ẋ Ż/Z² + 2 X Ż²/Z³."""
     X, X_dot, Z_dot = np.array([300.0, 900.0]), np.array([40.0, -15.0]), -25.0
     undamped = replace(C, velocity_time_s=1e12)
@@ -147,7 +147,7 @@ def test_told_acceleration_is_the_second_derivative_of_the_image(depth):
     np.testing.assert_allclose(told, want, rtol=1e-9)
 
 
-def test_told_acceleration_is_the_rate_of_the_predicted_velocity():
+def test_reported_acceleration_is_the_rate_of_the_predicted_velocity():
     mean = np.random.default_rng(3).normal(size=(5, 2, singer.STATES)) * 10.0
     mean[..., singer.GROWTH] *= 0.1
     dt = 1e-5
@@ -157,7 +157,7 @@ def test_told_acceleration_is_the_rate_of_the_predicted_velocity():
     np.testing.assert_allclose(singer.reported_motion(mean, C)[..., singer.ACCELERATION], rate, rtol=1e-3)
 
 
-def test_told_covariance_is_that_of_the_joint_state():
+def test_reported_covariance_is_that_of_the_joint_state():
     """J P Jᵀ of both axes at once, with derivatives by differences; the axes are independent."""
     rng = np.random.default_rng(4)
     mean, root = rng.normal(size=(2, singer.STATES)), rng.normal(size=(2, singer.STATES, singer.STATES))

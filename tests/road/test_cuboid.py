@@ -179,7 +179,7 @@ def test_sides_cut_by_the_picture_do_not_count() -> None:
     assert np.abs(found.motion.at(t) - whole.motion.at(t)).max() < 1.0
 
 
-def test_calibration_moves_a_vehicle_as_foretold() -> None:
+def test_calibration_moves_a_vehicle_as_predicted() -> None:
     t, boxes = _drive((4.5, 1.8, 1.5), np.random.default_rng(2), 0.0)
     spread = np.zeros((12, 12))
     spread[11, 11] = 0.05**2
@@ -222,7 +222,7 @@ def test_what_no_vehicle_is_as_small_as_is_no_vehicle() -> None:
 
 
 @pytest.mark.parametrize(("share", "name"), [(0.1, "truck"), (0.49, "truck"), (0.6, ""), (1.0, "")])
-def test_a_class_is_told_where_the_boxes_tell_the_length_better_than_the_class_does(share, name) -> None:
+def test_a_class_is_reported_where_the_boxes_tell_the_length_better_than_the_class_does(share, name) -> None:
     kind = max(range(len(CLASSES)), key=lambda k: CLASSES[k].mean[0])
     mean, spread = np.array(CLASSES[kind].mean), np.array(CLASSES[kind].spread)
     fit = CuboidFit(None, np.zeros((0, 0)), kind, mean, np.diag(share * spread**2), 1.0)

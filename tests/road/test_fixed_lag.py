@@ -68,7 +68,7 @@ def test_a_second_behind_is_nearly_as_good() -> None:
         assert (np.abs(found["mean"][last, k] - reference[last]) < 0.3 * deviation[last]).all()
 
 
-def test_each_state_is_told_once_in_order_and_in_time() -> None:
+def test_each_state_is_reported_once_in_order_and_in_time() -> None:
     log = np.concatenate([_log(2), _log(3, identity=7, start=0.7), _log(4, identity=4, start=6.5)])
     config = RoadLagConfig()
     steps, end = _follow(log, config)
@@ -159,7 +159,7 @@ def _seen_by_two(log: np.ndarray, since_s: float) -> np.ndarray:
     return log
 
 
-def test_a_sensor_that_comes_later_is_one_that_has_told_nothing_so_far() -> None:
+def test_a_sensor_that_comes_later_is_one_that_has_had_no_detection_so_far() -> None:
     """As if it had been known from the beginning, here by a box of another track."""
     log = _seen_by_two(_log(8), 1.6)
     other = _log(9, identity=2)[:1]

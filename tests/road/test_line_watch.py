@@ -96,23 +96,23 @@ def test_a_state_goes_on_where_it_was():
     assert all(one == found[None] for one in found.values())
 
 
-def test_a_track_is_asked_once_what_it_looks_like_as_it_passes():
+def test_a_track_is_asked_once_for_its_appearance_as_it_passes():
     camera, asked = camera_over_road(), []
     watch = LineWatch(camera, line_at(camera, 40.0), "left", LANES)
 
-    def looks(identity):
+    def appearance(identity):
         asked.append((identity, k))
         return np.array([0.5, float(identity)])
 
     found = []
     for k in range(40):
         pixels = camera.project(np.array([[2.0, 20.0 + 2.0 * k, 0.0], [6.0, 21.0 + 2.0 * k, 0.0]]))[0]
-        found += watch.take(k / 10.0, table(k / 10.0, [3, 4], pixels), looks)
+        found += watch.take(k / 10.0, table(k / 10.0, [3, 4], pixels), appearance)
     assert sorted(asked) == [(3, 10), (4, 10)]
     assert [unpacked_embedding(one.appearance).tolist() for one in found] == [[0.5, 3.0], [0.5, 4.0]]
 
 
-def test_a_track_that_ends_behind_the_line_is_told_and_forgotten():
+def test_a_track_that_ends_behind_the_line_is_reported_and_forgotten():
     camera = camera_over_road()
     watch = LineWatch(camera, line_at(camera, 40.0), "left", LANES)
     assert not drive(watch, camera, 20.0, seconds=1.6)

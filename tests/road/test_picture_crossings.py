@@ -85,7 +85,7 @@ def test_who_goes_back_and_comes_again_counts_once_on_the_road_and_that_is_said(
     ]
 
 
-def test_a_crossing_that_only_the_road_has_is_told() -> None:
+def test_a_crossing_that_only_the_road_has_is_reported() -> None:
     result = _result({1: _path(4.0, 42.0 - 20.0 * T)}, [])
     elsewhere = {1: _path(4.0, 60.0 - 20.0 * T)}
     found, agreements = with_unplaced(result, _table(elsewhere), {"gate": GATE})

@@ -259,7 +259,7 @@ def test_vehicles_anywhere_across_the_road_show_no_lanes_of_their_own() -> None:
     assert len(lanes.names) <= 1
 
 
-def test_a_speed_of_which_next_to_nothing_is_known_is_not_told() -> None:
+def test_a_speed_of_which_next_to_nothing_is_known_is_not_reported() -> None:
     assert reported_speed(interval(80.0, 5.0, 1.0)) == interval(80.0, 5.0, 1.0)
     assert reported_speed(interval(0.0, 4.0, 0.0)).kmh == 0.0
     assert math.isnan(reported_speed(interval(78.8, 100.0, 0.0)).kmh)

@@ -10,13 +10,13 @@ import pytest
 from jeat_graph import Scan, Tracker, load_config
 from jeat_graph.association.path_cover import Links
 from jeat_graph.io.tables.links_io import read_links, write_links
-from jeat_graph.tracking.identities.piece_appearance import learnt_likeness, link_cosines
+from jeat_graph.tracking.identities.piece_appearance import learnt_similarity, link_cosines
 
 PAIRS, EVERY_S, RATE_HZ, NUMBERS = 30, 7.6, 8.0, 16
 HIDDEN_S = (2.5, 5.2)
 
 
-def pillar(seed, likeness=None):
+def pillar(seed, similarity=None):
     """Pairs that walk side by side, and are hidden for longer than a causal track lives.
 
     A third of the pairs are far apart. Half of the others change sides behind the pillar, so that their
@@ -39,8 +39,8 @@ def pillar(seed, likeness=None):
         centre = np.stack([np.full(len(who), 100.0 + 60.0 * u), 300.0 + sides[who, late]], axis=1)
         centre += rng.normal(scale=0.7, size=centre.shape) + late * after[who]
         shown = None
-        if likeness is not None:
-            shown = np.sqrt(likeness) * own[who, 0] + np.sqrt(1.0 - likeness) * noise[who, late] + 0.3
+        if similarity is not None:
+            shown = np.sqrt(similarity) * own[who, 0] + np.sqrt(1.0 - similarity) * noise[who, late] + 0.3
             shown += 0.2 * rng.normal(size=shown.shape)
         boxes = np.concatenate([centre - [15.0, 20.0], np.tile([30.0, 40.0], (len(who), 1))], axis=1)
         scans.append(Scan(k / RATE_HZ, "rgb", boxes, np.full(len(who), 0.9), embeddings=shown))
@@ -48,9 +48,9 @@ def pillar(seed, likeness=None):
 
 
 @cache
-def decided(seed, likeness=None):
+def decided(seed, similarity=None):
     """Of the near objects how many kept their identity, and how many have another's; the links."""
-    scans, sides, near = pillar(seed, likeness)
+    scans, sides, near = pillar(seed, similarity)
     tracker = Tracker(
         load_config("default", ["smoother.identities=whole", "image.width=900", "image.height=600"])
     )
@@ -97,7 +97,7 @@ def test_looks_that_tell_nothing_change_little():
 
 def test_links_say_what_looks_told_where_there_were_some(tmp_path):
     plain, looks = decided(0)[2], decided(0, 0.45)[2]
-    assert "appearance" not in plain.told_terms()
+    assert "appearance" not in plain.shown_terms()
     assert looks.terms[:, 5].max() > 3.0
     np.testing.assert_allclose(looks.terms.sum(axis=1), looks.log_ratio)
     for number, links in enumerate((plain, looks)):
@@ -124,7 +124,7 @@ def test_what_both_sensors_say_counts_up_to_a_limit():
     rng = np.random.default_rng(4)
     p = (rng.random(400) < 0.4).astype(float)
     cosine = rng.normal(size=(2, 400)) + 2.0 * p
-    one, both = learnt_likeness(cosine[:1], p), learnt_likeness(cosine, p)
+    one, both = learnt_similarity(cosine[:1], p), learnt_similarity(cosine, p)
     assert both[p > 0].mean() == pytest.approx(2.0 * one[p > 0].mean(), rel=0.15)
-    assert np.abs(learnt_likeness(5.0 * cosine + 40.0 * p, p)).max() == 6.0
-    assert not learnt_likeness(np.full((2, 400), np.nan), p).any()
+    assert np.abs(learnt_similarity(5.0 * cosine + 40.0 * p, p)).max() == 6.0
+    assert not learnt_similarity(np.full((2, 400), np.nan), p).any()

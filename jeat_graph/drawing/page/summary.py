@@ -128,7 +128,7 @@ def link_table(data: RunData) -> Table | None:
     if data.links is None:
         return None
     links = data.links.between_tracks()
-    terms = links.told_terms()
+    terms = links.shown_terms()
     records: list[dict[str, Cell]] = [
         {
             "identity": int(links.track_id[k]),

@@ -46,7 +46,7 @@ def write_links(links: IdentityLinks, path: str | Path) -> None:
         "t_from": links.t_tail + 0.0,
         "t_to": links.t_head + 0.0,
     }
-    for name, values in links.told_terms().items():
+    for name, values in links.shown_terms().items():
         columns[_column(name)] = round_decimals(values, _DECIMALS)
     write_columns(columns, path)
 

@@ -18,7 +18,7 @@ from jeat_graph.data.embeddings import EmbeddingArray
 from jeat_graph.filters.model_constants import ModelConstants
 from jeat_graph.smoothers.joining import LearntScene, MeasuredBoxes, beginnings_of, ends_of, log_ratio
 from jeat_graph.tracking.identities.passes import Pass
-from jeat_graph.tracking.identities.piece_appearance import learnt_likeness, link_cosines
+from jeat_graph.tracking.identities.piece_appearance import learnt_similarity, link_cosines
 
 #: Share of the passes that make a link, from which on it stands.
 AGREED = 0.8
@@ -228,14 +228,14 @@ def _joined(
     links, causal = links.where(possible), causal[possible]
     voted = agreement.votes_between(piece, assigned, first)
     votes = _of_pairs(links, *voted, len(members)) / len(assigned)
-    likeness = None
+    similarity = None
     if recording.embeddings is not None:
         # By links that neither appearance nor the passes decide, which weighed appearance, too.
         plain = join(pieces, links, np.zeros(len(votes)), span, step, past)
         ends = (_columns(members, from_end=True), _columns(members, from_end=False))
         cosine = link_cosines(recording.embeddings, seen.sensor, *ends, links)
-        likeness = learnt_likeness(cosine, _drawn(plain.links, plain.cover)[1])
-    found = join(pieces, links, votes, span, step, past, likeness)
+        similarity = learnt_similarity(cosine, _drawn(plain.links, plain.cover)[1])
+    found = join(pieces, links, votes, span, step, past, similarity)
     return found, _only_links(links, causal, len(members))
 
 

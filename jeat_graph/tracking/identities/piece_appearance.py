@@ -34,7 +34,7 @@ def link_cosines(
     return np.array(found).reshape(len(found), len(links.tail))
 
 
-def learnt_likeness(cosine: FloatArray, probability: FloatArray) -> FloatArray:
+def learnt_similarity(cosine: FloatArray, probability: FloatArray) -> FloatArray:
     """Return ln of the ratio (L,) of "one object" to "two" that appearance gives links; 0: it says nothing.
 
     Args:

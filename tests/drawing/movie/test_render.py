@@ -159,7 +159,7 @@ def test_truth_between_frames_lies_on_the_straight_way():
     assert len(TruthAt(truth).at(0.4)[0]) == 0
 
 
-def test_truth_that_is_ignored_is_told_apart():
+def test_truth_that_is_ignored_is_drawn_apart():
     table = vehicle([0.0, 0.0])
     truth = GroundTruth(table.t, np.array([1, 2]), table.boxes, None, np.array([False, True]))
     wanted, ignored = TruthAt(truth).at(0.0)

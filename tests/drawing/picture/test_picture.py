@@ -27,7 +27,7 @@ def table_of(t, track_id, centre):
     )
 
 
-def test_a_standing_track_is_told_from_one_that_creeps():
+def test_a_standing_track_is_distinguished_from_one_that_creeps():
     t = np.arange(50) * 0.1
     still = np.column_stack([np.full(50, 300.0), np.full(50, 200.0)])
     creeping = np.column_stack([300.0 + 10.0 * t, np.full(50, 400.0)])
