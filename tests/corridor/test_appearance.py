@@ -73,7 +73,7 @@ def dense(tmp_path_factory):
 
 
 def dressed(dense, similarity):
-    """The gap with embeddings; the cosine of one vehicle at both is about `similarity`, that of two about 0."""
+    """The gap with embeddings; the cosine of one vehicle at both is about `similarity`, of two about 0."""
     rng = np.random.default_rng(7)
     own = rng.normal(size=(2000, NUMBERS))
     out = []

@@ -30,7 +30,7 @@ EVERY_S = 5.0
 
 @pytest.fixture(scope="module")
 def days(tmp_path_factory):
-    """Two days of one dense road, one to learn from: passages with appearance, and true vehicles, of A and B."""
+    """Two days of one dense road, one to learn from: passages with appearance, and vehicles, of A and B."""
     found = []
     for seed in (1, 2):
         traffic = CorridorTraffic(400.0, 2400.0, 110.0, (0.0, GAP_M), 0.04, 0.04)
