@@ -8,12 +8,16 @@ is drawn beyond a rig: how the first camera is mounted, the traffic, and detecto
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.picture_map import PictureMap
+from jeat_graph_sehn.simulation.imaging.lens import Lens
+from jeat_graph_sehn.simulation.imaging.lens_config import LensConfig
 from jeat_graph_sehn.simulation.scenario import Scenario
 from jeat_graph_sehn.simulation.sensors.clutter import ClutterConfig
 from jeat_graph_sehn.simulation.sensors.detectability import DetectabilityConfig
@@ -37,6 +41,11 @@ _TOGETHER_S, _MOST_LATE_S = 60.0, 15.0
 _TRUTH = TruthConfig(range_m=130.0, horizon_m=130.0, min_side_px=6.0)
 # One lane: the other direction's is out of sight, far beyond a median (m).
 _WIDE_MEDIAN_M, _LANE_TRUTH = 90.0, TruthConfig(range_m=90.0, horizon_m=90.0, min_side_px=6.0)
+# By what share of its radius a lens that bends moves the picture's corner: barrel, as wide lenses have it.
+_BENT = (-0.12, -0.02)
+# How far along the road the camera stands that looks back (m), and for how long views are together that are
+# too short (s).
+_FACING_M, _SHORT_S = (50.0, 100.0), (5.0, 14.0)
 _HELD_BACK = 991  # seed of the vehicles by which a registration is judged
 
 
@@ -75,13 +84,21 @@ def draw_scene(seed: int, kind: str = "road") -> RigScene:
 
     Args:
         seed: another seed, another rig.
-        kind: `road`; `lane`, all vehicles in one lane; or `apart`, where the cameras look at other roads.
+        kind: `road`; `bent`, both lenses have a barrel distortion; `facing`, the second camera stands along
+            the road and looks back; `short`, the cameras see the road together for a few seconds only;
+            `lane`, all vehicles in one lane; or `apart`, where the cameras look at other roads.
     """
     rng = np.random.default_rng(seed)
     scenario = _scenario(rng, kind == "lane")
     late = float(rng.uniform(-_MOST_LATE_S, _MOST_LATE_S))
-    rig = replace(draw_rig(rng, Camera.mounted(scenario.camera)), late_s=late)
-    duration = _TOGETHER_S + 2.0 * abs(late)
+    drawn = replace(draw_rig(rng, Camera.mounted(scenario.camera)), late_s=late)
+    rig = Rig.beside(Camera.mounted(scenario.camera), drawn)
+    if kind == "bent":
+        rig = replace(rig, common=_bent(rig.common, rng), own=_bent(rig.own, rng))
+    if kind == "facing":
+        rig = replace(rig, own=_looking_back(rig.own, rng))
+    together = float(rng.uniform(*_SHORT_S)) if kind == "short" else _TOGETHER_S
+    duration = together + 2.0 * abs(late)
     recording = record(scenario, seed, duration, rig)
     found = recording.detections
     if kind == "apart":
@@ -89,6 +106,20 @@ def draw_scene(seed: int, kind: str = "road") -> RigScene:
         found = Detections.concatenate([found.select(["rgb"]), elsewhere.select(["evt"])])
     assert recording.rig is not None
     return RigScene(recording.scenario, recording.rig, found)
+
+
+def _bent(camera: Camera, rng: np.random.Generator) -> Camera:
+    """Give a camera a lens that bends."""
+    corner = np.hypot(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy)
+    k1 = float(rng.uniform(*_BENT) / corner**2)
+    return Lens(LensConfig(k1=k1), camera, rng).camera_at(0.0)
+
+
+def _looking_back(camera: Camera, rng: np.random.Generator) -> Camera:
+    """Put a camera along the road, and turn it about the vertical so that it looks back."""
+    about = np.diag([-1.0, -1.0, 1.0])
+    place = np.array([-camera.position[0], float(rng.uniform(*_FACING_M)), camera.position[2]])
+    return replace(camera, position=place, rotation=camera.rotation @ about)
 
 
 def _scenario(rng: np.random.Generator, one_lane: bool) -> Scenario:
@@ -142,21 +173,42 @@ def _detector(rate_hz: float) -> SensorModel:
     )
 
 
-def judge(scene: RigScene, way: PictureMap, seconds: float = 40.0) -> dict[str, FloatArray]:
-    """Errors (N,) of true boxes of other vehicles that are brought to the first picture (px), by class.
+class HeldBack(NamedTuple):
+    """True boxes of other vehicles, wholly in both pictures.
 
-    Only boxes count that lie wholly in both pictures.
+    Attributes:
+        ours: (N, 4) in the first picture (px).
+        theirs: (N, 4) in the second (px).
+        names: (N,) classes.
     """
+
+    ours: FloatArray
+    theirs: FloatArray
+    names: npt.NDArray[np.str_]
+
+
+def held_back(scene: RigScene, seconds: float = 40.0) -> HeldBack:
+    """Look at other vehicles on the same road by both cameras."""
     s = scene.scenario
     held = Scene.build(_HELD_BACK, seconds, s.road, s.fleet, s.traffic, s.light, s.camera)
     times = np.arange(0.0, seconds, 0.5)
     ours, theirs = (_whole(look(replace(held, camera=camera), times, s.truth)) for camera in scene.cameras)
     _, a, b = np.intersect1d(_keys(ours), _keys(theirs), return_indices=True)
-    moved, _ = way.boxes(theirs.boxes[b])
-    left = ours.boxes[a] - moved
-    error = np.linalg.norm(left[:, :2] + 0.5 * left[:, 2:], axis=1)
-    names = KIND_NAMES[ours.kind[a]]
-    return {str(name): error[names == name] for name in KIND_NAMES if (names == name).any()}
+    return HeldBack(ours.boxes[a], theirs.boxes[b], np.asarray(KIND_NAMES[ours.kind[a]], dtype=np.str_))
+
+
+def errors_px(held: HeldBack, way: PictureMap) -> FloatArray:
+    """Errors (N, 2) of the centres of true boxes that are brought to the first picture (px)."""
+    moved, _ = way.boxes(held.theirs)
+    left = held.ours - moved
+    return np.asarray(left[:, :2] + 0.5 * left[:, 2:])
+
+
+def judge(scene: RigScene, way: PictureMap, seconds: float = 40.0) -> dict[str, FloatArray]:
+    """Errors (N,) of true boxes of other vehicles that are brought to the first picture (px), by class."""
+    held = held_back(scene, seconds)
+    error = np.linalg.norm(errors_px(held, way), axis=1)
+    return {str(name): error[held.names == name] for name in KIND_NAMES if (held.names == name).any()}
 
 
 def _whole(views: Views) -> Views:

@@ -8,7 +8,8 @@ sensors:
     kind: event               # or camera, or other
     image: [640, 480]
     to_picture: [[1.9, 0.01, 8.2], [-0.01, 1.9, 60.5], [0, 0, 1]]   # or scale; 3 x 4 with parallax
-    covariance: [...]         # of its numbers but the last of the 3 x 3, row by row
+    covariance: [...]         # of its numbers but the last of the 3 x 3, row by row; then of the lenses
+    lens: [-0.21, -0.18]      # radial distortion k1 of its lens and of the common picture's, if they bend
     offset_s: 0.1502          # taken off its times
     offset_std_s: 0.0004
     drift_ppm: 12.0           # by how much its clock is too fast, from at_s on
@@ -35,7 +36,7 @@ from jeat_graph.data.picture_map import PictureMap
 NONE, SCALE = "none", "scale"
 _TOP = ("image", "sensors")
 _CLOCK = tuple(one.name for one in dataclasses.fields(ClockConfig))
-_SENSOR = ("kind", "image", "to_picture", "covariance", *_CLOCK)
+_SENSOR = ("kind", "image", "to_picture", "covariance", "lens", *_CLOCK)
 _SHAPES = ((3, 3), (3, 4))
 # Digits of what is written: boxes are good to a hundredth of a pixel, clocks to a microsecond.
 _DIGITS, _TIME_PLACES, _DRIFT_PLACES = 9, 6, 3
@@ -90,12 +91,14 @@ def sensor_entry(way: PictureMap, clock: ClockConfig | None, size: tuple[int, in
         size: width and height of its picture (px).
     """
     columns = 4 if way.parallax else 3
-    kept = [k for k in range(11) if columns == 4 or k not in (3, 7, 10)]
+    kept = [k for k in range(way.free) if columns == 4 or k not in (3, 7, 10)]
     out: dict[str, Any] = {
         "image": list(size),
         "to_picture": [[_short(v) for v in row[:columns]] for row in way.matrix],
         "covariance": [[_short(v) for v in row] for row in way.covariance[kept][:, kept]],
     }
+    if way.lenses is not None:
+        out["lens"] = [_short(lens.k1) for lens in way.lenses]
     if clock is not None:
         out |= {
             "offset_s": round(clock.offset_s, _TIME_PLACES),
@@ -130,9 +133,12 @@ def _sensor(one: Any, where: str, common: tuple[float, float] | None, file: Path
         if own is None:
             raise DataError(f"{where}: to_picture needs `image`, the size of the sensor's own picture", file)
         out["to_picture"] = _numbers(way, _SHAPES, f"{where}.to_picture", file)
+        out |= _lens(one, f"{where}.lens", file)
         if "covariance" in one:
-            free = len(out["to_picture"]) - 1
+            free = len(out["to_picture"]) - 1 + len(out.get("lens", ()))
             out["to_picture_cov"] = _numbers(one["covariance"], ((free, free),), f"{where}.covariance", file)
+    elif "lens" in one:
+        raise DataError(f"{where}.lens: goes with a matrix, and to_picture has none", file)
     elif "covariance" in one:
         raise DataError(f"{where}.covariance: is of a matrix, and to_picture has none", file)
     if own is not None and way != NONE:
@@ -141,6 +147,16 @@ def _sensor(one: Any, where: str, common: tuple[float, float] | None, file: Path
     if clock:
         out["clock"] = clock
     return out
+
+
+def _lens(one: Mapping[str, Any], where: str, file: Path) -> dict[str, Any]:
+    if "lens" not in one:
+        return {}
+    value = one["lens"]
+    numbers = value if isinstance(value, list) else []
+    if len(numbers) != 2 or not all(_is_number(v) and abs(v) <= 1.0 for v in numbers):
+        raise DataError(f"{where}: must be two numbers from -1 to 1, not {str(value)[:40]!r}", file)
+    return {"lens": [float(v) for v in value]}
 
 
 def _check_keys(tree: Any, known: tuple[str, ...], where: str, file: Path) -> None:

@@ -11,6 +11,8 @@ from jeat_graph.data.errors import ConfigError
 KINDS = EVENT, CAMERA, OTHER = "event", "camera", "other"
 # Numbers of a homography, and of one with parallax.
 _MATRICES = (9, 12)
+# Lenses that a map may have, and the strongest distortion of one.
+_LENSES, _MOST_K1 = 2, 1.0
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,17 @@ class SensorConfig(Section):
     )
     to_picture_cov: tuple[float, ...] = field(
         default=(),
-        metadata={"doc": "covariance of its numbers but the one that is 1, row by row: 64 or 121 numbers"},
+        metadata={
+            "doc": "covariance of its numbers but the one that is 1, row by row: 64 or 121 numbers; with "
+            "`lens` 169, the two of the lenses last"
+        },
+    )
+    lens: tuple[float, ...] = field(
+        default=(),
+        metadata={
+            "doc": "radial distortion k1 of its own lens and of the common picture's, each with the width of "
+            "its picture as the focal length (see `register`); none: neither bends"
+        },
     )
     clock: ClockConfig | None = field(
         default=None, metadata={"doc": "offset and drift of its clock against the common one"}
@@ -111,8 +123,13 @@ class SensorConfig(Section):
             raise ConfigError(f"to_picture: must have 9 or 12 numbers, or none, not {count}")
         if count and self.image is None:
             raise ConfigError("to_picture: needs `image`, the size of the sensor's own picture")
-        if free and (not count or free != (count - 1) ** 2):
-            raise ConfigError(f"to_picture_cov: must have {max(count - 1, 0)} rows and columns")
+        if len(self.lens) not in (0, _LENSES) or not all(abs(k1) <= _MOST_K1 for k1 in self.lens):
+            raise ConfigError(f"lens: must be two numbers from {-_MOST_K1:g} to {_MOST_K1:g}, or none")
+        if self.lens and not count:
+            raise ConfigError("lens: needs to_picture")
+        wanted = (max(count - 1, 0) + len(self.lens)) ** 2
+        if free and free != wanted:
+            raise ConfigError(f"to_picture_cov: must have {wanted} numbers")
 
 
 @dataclass(frozen=True)

@@ -8,20 +8,26 @@ its lower edge stands on the road and the rest is about as far away. So a point 
 
 for a camera without roll, where the inverse depth falls linearly with the row of the lower edge: a 3 x 4
 matrix [G q], and 11 numbers in all. With q = 0 it is the homography (Hartley and Zisserman, *Multiple View
-Geometry*, ch. 13: a plane and the parallax to it).
+Geometry*, ch. 13: a plane and the parallax to it). Lenses that bend add two numbers: places of the own
+picture are straightened before, and bent as the common picture's lens does after.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from jeat_graph.data.arrays import BoolArray, FloatArray
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.lens import RadialLens
 
 #: Numbers of a homography, and of one with parallax, row by row; the last of the 3 x 3 part may be any.
 HOMOGRAPHY, WITH_PARALLAX = 9, 12
+#: Places of the free elements among those of the 3 x 4 matrix, row by row: (2, 2) is 1.
+ONE_IS_FIXED = [k for k in range(WITH_PARALLAX) if k != 10]
+#: Numbers that two lenses add.
+LENSES = 2
 _ROUNDS = 8
 # A box that stands for others where the uncertainty of a way is asked for: a share of the picture's height.
 _USUAL_HEIGHT = 0.08
@@ -35,7 +41,8 @@ class PictureMap:
 
     Attributes:
         matrix: (3, 4) of (column, row, 1, height of the box), in px; element (2, 2) is 1.
-        covariance: (11, 11) of its other elements, row by row.
+        covariance: (11, 11) of its other elements, row by row; with lenses (13, 13), their k1 last.
+        lenses: of the own and of the common picture, None where neither bends.
 
     Raises:
         DataError: what is no such matrix.
@@ -43,6 +50,7 @@ class PictureMap:
 
     matrix: FloatArray
     covariance: FloatArray = field(default_factory=lambda: np.zeros((WITH_PARALLAX - 1, WITH_PARALLAX - 1)))
+    lenses: tuple[RadialLens, RadialLens] | None = None
 
     def __post_init__(self) -> None:
         G = self.matrix[:, :3]
@@ -51,14 +59,23 @@ class PictureMap:
         size = np.linalg.norm(G, axis=0).prod()
         if not abs(np.linalg.det(G)) > _LEAST_DETERMINANT * size:
             raise DataError("is a matrix that cannot be inverted: it takes a picture to a line")
+        if self.lenses is not None and len(self.covariance) < self.free:
+            full = np.zeros((self.free, self.free))
+            full[: len(self.covariance), : len(self.covariance)] = self.covariance
+            object.__setattr__(self, "covariance", full)
 
     @staticmethod
-    def of_numbers(numbers: FloatArray, covariance: FloatArray | None = None) -> PictureMap:
+    def of_numbers(
+        numbers: FloatArray,
+        covariance: FloatArray | None = None,
+        lenses: tuple[RadialLens, RadialLens] | None = None,
+    ) -> PictureMap:
         """Make a map of 9 numbers (a homography) or 12 (one with parallax), row by row.
 
         Args:
             numbers: (9,) or (12,).
-            covariance: of all but the one that scales them: (8, 8) or (11, 11).
+            covariance: of all but the one that scales them: (8, 8) or (11, 11); two more with lenses.
+            lenses: of the own and of the common picture.
 
         Raises:
             DataError: another number of them, or a matrix that is none.
@@ -70,13 +87,17 @@ class PictureMap:
         matrix[:, :columns] = np.asarray(numbers, dtype=np.float64).reshape(3, columns)
         if not np.isfinite(matrix).all() or matrix[2, 2] == 0.0:
             raise DataError("must be finite numbers, the third of the last row not 0")
-        full = np.zeros((WITH_PARALLAX - 1, WITH_PARALLAX - 1))
+        free = WITH_PARALLAX - 1 + (0 if lenses is None else LENSES)
+        full = np.zeros((free, free))
         if covariance is not None:
-            kept = _free(3) if columns == 3 else list(range(WITH_PARALLAX - 1))
+            kept = _of_homography() if columns == 3 else list(range(WITH_PARALLAX - 1))
+            kept += range(WITH_PARALLAX - 1, free)
             if covariance.shape != (len(kept), len(kept)) or not np.isfinite(covariance).all():
                 raise DataError(f"the covariance must be {len(kept)} x {len(kept)} finite numbers")
-            full[np.ix_(kept, kept)] = covariance / matrix[2, 2] ** 2
-        return PictureMap(matrix / matrix[2, 2], full)
+            scale = np.ones(len(kept))
+            scale[: len(numbers) - 1] = 1.0 / matrix[2, 2]
+            full[np.ix_(kept, kept)] = covariance * np.outer(scale, scale)
+        return PictureMap(matrix / matrix[2, 2], full, lenses)
 
     @staticmethod
     def scale(own: tuple[float, float], common: tuple[float, float]) -> PictureMap:
@@ -86,6 +107,32 @@ class PictureMap:
         return PictureMap(matrix)
 
     @property
+    def free(self) -> int:
+        """How many numbers it is made of: 11, with lenses 13."""
+        return WITH_PARALLAX - 1 + (0 if self.lenses is None else LENSES)
+
+    @property
+    def numbers(self) -> FloatArray:
+        """Its free numbers (11,) row by row; with lenses (13,), their k1 last."""
+        k1 = [] if self.lenses is None else [lens.k1 for lens in self.lenses]
+        return np.append(self.matrix.ravel()[ONE_IS_FIXED], k1)
+
+    def moved(self, step: FloatArray) -> PictureMap:
+        """Return the map whose free numbers are changed by a step (11,) or (13,); it has no covariance.
+
+        Raises:
+            DataError: the change leaves no map.
+        """
+        numbers = self.numbers + step
+        matrix = self.matrix.ravel().copy()
+        matrix[ONE_IS_FIXED] = numbers[: WITH_PARALLAX - 1]
+        lenses = self.lenses
+        if lenses is not None:
+            k1 = numbers[WITH_PARALLAX - 1 :]
+            lenses = (replace(lenses[0], k1=float(k1[0])), replace(lenses[1], k1=float(k1[1])))
+        return PictureMap(matrix.reshape(3, 4), lenses=lenses)
+
+    @property
     def parallax(self) -> bool:
         """Whether it is more than a homography."""
         return bool(self.matrix[:, 3].any())
@@ -93,10 +140,13 @@ class PictureMap:
     def points(self, xy: FloatArray, height: FloatArray | float = 0.0) -> FloatArray:
         """Map points (..., 2), with the heights (...) that say their depth; NaN where one is not seen."""
         shape = xy.shape[:-1]
+        if self.lenses is not None:
+            xy = self.lenses[0].straighten(xy)
         rows = np.stack([xy[..., 0], xy[..., 1], np.ones(shape), np.broadcast_to(height, shape)], axis=-1)
         out = rows @ self.matrix.T
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.where(out[..., 2:] > 0.0, out[..., :2] / out[..., 2:], np.nan))
+            there = np.asarray(np.where(out[..., 2:] > 0.0, out[..., :2] / out[..., 2:], np.nan))
+        return there if self.lenses is None else self.lenses[1].bend(there)
 
     def boxes(self, boxes: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Map boxes.
@@ -136,23 +186,39 @@ class PictureMap:
         """Own points (N, 2) of common ones (N, 2) in boxes of own heights (N,)."""
         planes = np.repeat(self.matrix[None, :, :3], len(xy), axis=0)
         planes[:, :, 2] += height[:, None] * self.matrix[:, 3]
+        if self.lenses is not None:
+            xy = self.lenses[1].straighten(xy)
         rows = np.concatenate([xy, np.ones((len(xy), 1))], axis=1)
         seen = np.isfinite(planes).all(axis=(1, 2))
         out = np.full((len(xy), 3), np.nan)
         out[seen] = np.linalg.solve(planes[seen], rows[seen][..., None])[..., 0]
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(out[:, :2] / out[:, 2:])
+            own = np.asarray(out[:, :2] / out[:, 2:])
+        return own if self.lenses is None else self.lenses[0].bend(own)
 
     def jacobian(self, xy: FloatArray, height: FloatArray) -> FloatArray:
-        """Derivative (N, 2, 11) of mapped points by the free elements, at points (N, 2) and heights (N,)."""
-        rows = np.stack([xy[:, 0], xy[:, 1], np.ones(len(xy)), height], axis=1)
+        """Derivative of mapped points by the free elements, at points (N, 2) and heights (N,).
+
+        Returns:
+            (N, 2, 11); with lenses (N, 2, 13), by their k1 last.
+        """
+        straight = xy if self.lenses is None else self.lenses[0].straighten(xy)
+        rows = np.stack([straight[:, 0], straight[:, 1], np.ones(len(xy)), height], axis=1)
         out = rows @ self.matrix.T
         there = out[:, :2] / out[:, 2:]
         J = np.zeros((len(xy), 2, WITH_PARALLAX))
         for axis in range(2):
             J[:, axis, 4 * axis : 4 * axis + 4] = rows
             J[:, axis, 8:] = -there[:, axis, None] * rows
-        return np.asarray((J / out[:, 2, None, None])[:, :, _free(4)])
+        J = (J / out[:, 2, None, None])[:, :, ONE_IS_FIXED]
+        if self.lenses is None:
+            return np.asarray(J)
+        own, common = self.lenses
+        by_place = (self.matrix[:2, :2] - there[:, :, None] * self.matrix[2, :2]) / out[:, 2, None, None]
+        # Of the implicit function: a place moves so that it is seen where it is.
+        inward = -np.linalg.solve(own.bend_jacobian(straight), own.bend_by_k1(straight)[..., None])
+        J = common.bend_jacobian(there) @ np.concatenate([J, by_place @ inward], axis=2)
+        return np.concatenate([J, common.bend_by_k1(there)[..., None]], axis=2)
 
     def std_px(self, own: tuple[float, float]) -> float:
         """Return by how much a mapped centre is uncertain, rms over an own picture of that size (px)."""
@@ -177,15 +243,11 @@ class PictureMap:
         return float(np.exp(np.mean(np.log(there[good, 2:] / boxes[good, 2:]))))
 
 
-def _free(columns: int) -> list[int]:
-    """Places of the free elements of a matrix of 3 rows among those of 3 x 4, or among its own if 4 columns.
-
-    For three columns these are places among the eleven free elements of the full matrix.
-    """
-    everywhere = [k for k in range(WITH_PARALLAX) if k != 10]
-    if columns == 4:
-        return everywhere
-    return [everywhere.index(4 * row + column) for row in range(3) for column in range(3) if row + column < 4]
+def _of_homography() -> list[int]:
+    """Places of a homography's free elements among the eleven of a map with parallax."""
+    return [
+        ONE_IS_FIXED.index(4 * row + column) for row in range(3) for column in range(3) if row + column < 4
+    ]
 
 
 def _spread(own: tuple[float, float]) -> tuple[FloatArray, FloatArray]:

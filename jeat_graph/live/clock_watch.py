@@ -6,7 +6,7 @@ the same before anything is taken off. Nothing asks for the clock on the wall, o
 the same scans in the same order always give the same.
 
 A clock that was found, or that a rig gives, is compared again when it has stepped (`clock_steps`), and every
-ten minutes: so one that drifts is followed.
+ten minutes. Between, one that drifts is followed by what vehicles' boxes show (`clock_drift`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.scan import trusted_scan
+from jeat_graph.live.clock_drift import ClockDrift
 from jeat_graph.runs.clock_comparison import (
     LEAST_S,
     ClockComparison,
@@ -116,6 +117,7 @@ class ClockWatch:
         self._window: dict[str, list[Scan]] = {}  # what is being compared
         self._done = 0  # steps of that
         self._work: Generator[None, None, tuple[str, _Compared]] | None = None
+        self._drift = ClockDrift()
 
     def lag_s(self, sensor: str) -> float:
         """Return what is taken off a sensor's times (s)."""
@@ -134,7 +136,7 @@ class ClockWatch:
         self._meet(watched)
         if not self._waits_for_another() and len(self._settled) == len(self._met):
             self._compare_again_in_time(watched)
-            return None
+            return self._follow(watched)
         steps = sum(self._hear(scan) for scan in watched)
         if self._work is None and self._is_due():
             self._window = {name: list(one.scans) for name, one in sorted(self._heard.items())}
@@ -149,6 +151,26 @@ class ClockWatch:
                     self._compared += 1
                     return self._conclude(*end.value)
         return None
+
+    def _follow(self, scans: Sequence[Scan]) -> ClockNews | None:
+        """Take off what known clocks have drifted."""
+        if len(self._settled) < 2:
+            return None
+        found = self._drift.saw(scans, self._settled[0])
+        newest = {scan.sensor: scan.t for scan in scans}
+        lines: list[str] = []
+        for name, drifted in found.items():
+            lag_s = round(self.lag_s(name) + drifted.lag_s, 6)
+            at_s = newest.setdefault(name, max(newest.values()))
+            self.clocks[name] = {"lag_s": lag_s, "std_s": drifted.std_s, "at_s": at_s}
+            if f"{name} drifts" not in self._warned:
+                self._warned.append(f"{name} drifts")
+                lines.append(
+                    f"sensor {name!r}: its clock drifts: its boxes are {drifted.lag_s:+.3f} s late beside "
+                    f"those of {self._settled[0]!r}, which is taken off, and followed from now on (--set "
+                    "input.clocks=as_given leaves it)"
+                )
+        return ClockNews(found, newest, lines) if found else None
 
     def _meet(self, scans: Sequence[Scan]) -> None:
         """Watch sensors that are heard for the first time."""
@@ -175,6 +197,7 @@ class ClockWatch:
         """
         before = self.lag_s(sensor)
         self.clocks[sensor] = {"lag_s": round(before + step_s, 6), "std_s": std_s, "at_s": at_s}
+        self._drift.forget()
         self._reset()
         if sensor in self._settled and len(self._settled) > 1:
             self._settled.remove(sensor)
@@ -203,6 +226,7 @@ class ClockWatch:
         """Forget what was heard: there is another time, or all is known."""
         self._heard, self._last, self._compared = {}, {}, 0
         self._window, self._done, self._work = {}, 0, None
+        self._drift.forget()
 
     def _hear(self, scan: Scan) -> int:
         """Take note of one scan; how many steps of the work are due with it."""
@@ -294,6 +318,7 @@ class ClockWatch:
             "last": self._last,
             "window": self._window,
             "done": self._done,
+            "drift": self._drift.state(),
         }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -308,6 +333,7 @@ class ClockWatch:
         }
         self._last = {pair: list(one) for pair, one in state["last"].items()}
         self._window, self._done = dict(state["window"]), state["done"]
+        self._drift.set_state(state["drift"])
         if self._window:
             self._begin_work()
             assert self._work is not None

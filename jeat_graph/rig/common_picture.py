@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from jeat_graph.data.box_std import scaled_std
 from jeat_graph.data.camera_motion import scaled_motion
 from jeat_graph.data.detections import Detections, Scan
 from jeat_graph.data.errors import ConfigError, DataError
+from jeat_graph.data.lens import RadialLens
 from jeat_graph.data.picture_map import PictureMap
 
 _PPM = 1e-6
@@ -134,7 +135,7 @@ class CommonPicture:
 
 
 # What a sensor's configuration says of its way.
-_WAY_KEYS = ("image", "to_picture", "to_picture_cov", "clock")
+_WAY_KEYS = ("image", "to_picture", "to_picture_cov", "lens", "clock")
 _NO_WAY = Way(None, None, None)
 
 
@@ -189,7 +190,7 @@ def without_ways(config: Config) -> Config:
     return replace(
         config,
         sensors={
-            name: replace(one, image=None, to_picture=(), to_picture_cov=(), clock=None)
+            name: replace(one, image=None, to_picture=(), to_picture_cov=(), lens=(), clock=None)
             for name, one in config.sensors.items()
         },
     )
@@ -248,12 +249,14 @@ def _way(name: str, sensor: SensorConfig, config: Config) -> Way:
         return Way(None, None, sensor.clock)
     if sensor.to_picture:
         numbers = np.array(sensor.to_picture)
-        free = len(numbers) - 1
-        covariance = None
+        free = len(numbers) - 1 + len(sensor.lens)
+        covariance, lenses = None, None
         if sensor.to_picture_cov:
             covariance = np.array(sensor.to_picture_cov).reshape(free, free)
+        if sensor.lens:
+            lenses = lenses_of(sensor.lens, sensor.image, (config.image.width, config.image.height))
         try:
-            picture = PictureMap.of_numbers(numbers, covariance)
+            picture = PictureMap.of_numbers(numbers, covariance, lenses)
         except DataError as error:
             raise ConfigError(f"sensors.{name}.to_picture: {error.message}") from None
         return Way(picture, sensor.image, sensor.clock)
@@ -274,12 +277,21 @@ def _way(name: str, sensor: SensorConfig, config: Config) -> Way:
     return Way(PictureMap.scale(own, common), own, sensor.clock)
 
 
+def lenses_of(
+    k1: Sequence[float], own: tuple[float, float], common: tuple[float, float]
+) -> tuple[RadialLens, RadialLens]:
+    """Return the lenses of the own and of the common picture (width, height in px) with their distortions."""
+    return RadialLens.of_picture(k1[0], own), RadialLens.of_picture(k1[1], common)
+
+
 def _note(name: str, way: Way) -> str:
     parts = []
     if way.picture is not None and way.own is not None:
         kind = "a matrix with parallax" if way.picture.parallax else "a homography"
         if np.array_equal(way.picture.matrix[:, :3], np.diag(way.picture.matrix[:, :3].diagonal())):
             kind = "scale"
+        if way.picture.lenses is not None:
+            kind += " between lenses that bend"
         std = way.picture.std_px(way.own)
         sure = f" (± {std:.2g} px)" if std else ""
         parts.append(

@@ -1,14 +1,15 @@
 """Picture and clock to the pixel and the millisecond: one factor graph of all matched vehicles.
 
-Unknowns are the map from the second picture to the first (8 numbers, and 3 for parallax), the offset and the
-drift of the second clock, and the path of every matched vehicle in the first picture, a white-jerk process. A
-box of the first sensor measures the path at its time; one of the second, mapped, measures it at its time on
-the common clock. Each is linearised about what was found last, and all are solved together by GTSAM
-(`smoothers.gtsam.shared_paths`), until nothing moves.
+Unknowns are the map from the second picture to the first (8 numbers, 3 for parallax, and one for each lens
+where lenses bend), the offset and the drift of the second clock, and the path of every matched vehicle in the
+first picture, a white-jerk process. A box of the first sensor measures the path at its time; one of the
+second, mapped, measures it at its time on the common clock. Each is linearised about what was found last, and
+all are solved together by GTSAM (`smoothers.gtsam.shared_paths`), until nothing moves.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,14 +17,17 @@ import numpy as np
 from jeat_graph.config.fields import SMALLEST
 from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.arrays import FloatArray, IntArray
-from jeat_graph.data.picture_map import PictureMap
+from jeat_graph.data.lens import RadialLens
+from jeat_graph.data.picture_map import LENSES, ONE_IS_FIXED, PictureMap
 from jeat_graph.filters.motion import process_noise, transition
+from jeat_graph.rig.between_vehicles import LensEvidence, jackknife, lens_evidence
 from jeat_graph.rig.common_picture import common_time
 from jeat_graph.rig.matching import MatchedTracks
 from jeat_graph.rig.sensor_tracks import SensorTracks, TrackMeasurements
-from jeat_graph.smoothers.gtsam.shared_paths import PathRows, SharedPaths, solve_paths
+from jeat_graph.smoothers.gtsam.shared_paths import PathRows, solve_paths
 
-_ROUNDS, _ENOUGH_PX = 12, 1e-3
+# Rounds of linearising, of those that only matches are chosen by; they end where nothing moves by more (px).
+_ROUNDS, _ROUGH_ROUNDS, _ENOUGH_PX = 12, 5, 1e-2
 # Steps of a path's states (s), and how far they reach beyond its first and last measurement (s).
 _STEP_S, _BEYOND_S = 0.25, 0.4
 # Root spectral density of the jerk: so many sizes (1/s^2.5), and so many with the 2.5th power of the growth.
@@ -32,7 +36,6 @@ _JERK, _JERK_PER_GROWTH = 1.0, 60.0
 _SIGMA, _LEAST_SIGMA, _HUBER = 0.04, 0.02, 2.0
 # The states that GTSAM sees are in px and these units of time (s).
 _TAU_S = 0.2
-_FREE = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 11]
 _CLOCK = 2
 # Prior standard deviations. Of the affine part about the first map (1 and px): none to speak of. Of the
 # perspective part about that of two lenses turned against each other by the angle that their pictures are
@@ -45,6 +48,8 @@ _PRIOR_PARALLAX, _PRIOR_PARALLAX_DOWN, _PRIOR_PARALLAX_DEPTH = 0.1, 0.05, 0.015
 # The prior gives way where the first map is so many standard deviations beside it.
 _FAR_OFF = 0.2
 _PRIOR_OFFSET_S, _PRIOR_DRIFT_PPM = 0.5, 30.0
+# Radial distortion, with the picture's width as the focal length: wide lenses have -.1 to -.3.
+_PRIOR_K1 = 0.2
 _PPM = 1e-6
 # First guesses of velocity and acceleration are uncertain by so many sizes a second, and a second squared.
 _START = np.array([2.0, 20.0, 100.0])
@@ -59,6 +64,7 @@ class Refined(NamedTuple):
         residual_px: (2,) rms of the measurements' residuals of each sensor, in the first picture (px).
         sizes_px: mean size of the boxes there (px).
         vehicles: number of paths.
+        bends: whether the residuals say that a lens bends; None where the map has lenses.
     """
 
     way: PictureMap
@@ -66,17 +72,14 @@ class Refined(NamedTuple):
     residual_px: tuple[float, float]
     sizes_px: float
     vehicles: int
+    bends: LensEvidence | None
 
 
 class _Unknowns(NamedTuple):
-    matrix: FloatArray
+    way: PictureMap
     offset_s: float
     drift_ppm: float
     at_s: float
-
-    @property
-    def way(self) -> PictureMap:
-        return PictureMap(self.matrix)
 
     @property
     def clock(self) -> ClockConfig:
@@ -84,12 +87,14 @@ class _Unknowns(NamedTuple):
             offset_s=no_smaller(self.offset_s), drift_ppm=no_smaller(self.drift_ppm), at_s=self.at_s
         )
 
+    @property
+    def numbers(self) -> FloatArray:
+        return np.append(self.way.numbers, [self.offset_s, self.drift_ppm])
+
     def moved(self, step: FloatArray) -> _Unknowns:
-        numbers = self.matrix.ravel().copy()
-        numbers[_FREE] += step[: len(_FREE)]
-        offset, drift = step[len(_FREE) :]
+        offset, drift = step[-_CLOCK:]
         return self._replace(
-            matrix=numbers.reshape(3, 4),
+            way=self.way.moved(step[:-_CLOCK]),
             offset_s=self.offset_s + float(offset),
             drift_ppm=self.drift_ppm + float(drift),
         )
@@ -110,6 +115,7 @@ def refine(
     second: SensorTracks,
     matched: MatchedTracks,
     sizes: tuple[tuple[float, float], tuple[float, float]],
+    rough: bool = False,
 ) -> Refined:
     """Solve for map, clock and paths.
 
@@ -118,6 +124,7 @@ def refine(
         second: of the other.
         matched: which belong together, and a first map and offset.
         sizes: width and height of both pictures (px).
+        rough: a few rounds are enough, for vehicles will be matched again by the result.
 
     Raises:
         RuntimeError: GTSAM's, if the system is indeterminate.
@@ -125,24 +132,24 @@ def refine(
     """
     theirs = [second.measured[b] for b in matched.b]
     at = float(np.median(np.concatenate([one.t for one in theirs])))
-    unknowns = _Unknowns(matched.way.matrix, matched.offset_s, 0.0, at)
+    unknowns = _Unknowns(matched.way, matched.offset_s, 0.0, at)
     pairs = [(first.measured[a], second.measured[b]) for a, b in zip(matched.a, matched.b, strict=True)]
     paths = [_path(ours, other, unknowns.clock) for ours, other in pairs]
     sigma = (_SIGMA, _SIGMA)
     centre, scale = _prior(unknowns, *sizes)
-    round_number = 0
+    round_number, rounds = 0, _ROUGH_ROUNDS if rough else _ROUNDS
     while True:
         round_number += 1
         rows, residuals = zip(*(_rows(path, unknowns, sigma, scale) for path in paths), strict=True)
-        shift = (_numbers(unknowns) - centre) / scale
+        shift = (unknowns.numbers - centre) / scale
         solved = solve_paths(rows, np.eye(len(scale)), -shift)
         unknowns = unknowns.moved(scale * solved.shared)
         paths = [
             path._replace(states=_unscaled(states)) for path, states in zip(paths, solved.states, strict=True)
         ]
         sigma = (_robust([part for one in residuals for part in one]),) * 2
-        if round_number == _ROUNDS or _largest_move(unknowns.way, scale * solved.shared, paths) < _ENOUGH_PX:
-            return _result(unknowns, solved, scale, paths, sigma)
+        if round_number == rounds or _largest_move(unknowns.way, scale * solved.shared, paths) < _ENOUGH_PX:
+            return _result(unknowns, scale, paths, sigma, sizes)
 
 
 def no_smaller(value: float) -> float:
@@ -150,18 +157,15 @@ def no_smaller(value: float) -> float:
     return value if abs(value) > SMALLEST else 0.0
 
 
-def _numbers(unknowns: _Unknowns) -> FloatArray:
-    return np.append(unknowns.matrix.ravel()[_FREE], [unknowns.offset_s, unknowns.drift_ppm])
-
-
 def _prior(
     first: _Unknowns, common: tuple[float, float], own: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
     """Means (m,) and standard deviations (m,) of the unknowns before any vehicle is seen."""
     half = 0.5 * max(own)
-    gain = float(np.sqrt(abs(np.linalg.det(first.matrix[:2, :2]))))
+    matrix = first.way.matrix
+    gain = float(np.sqrt(abs(np.linalg.det(matrix[:2, :2]))))
     centre, std = np.zeros((3, 4)), np.ones((3, 4))
-    centre[:2, :3] = first.matrix[:2, :3]
+    centre[:2, :3] = matrix[:2, :3]
     std[:2, :2], std[:2, 2] = _PRIOR_LINEAR * gain, _PRIOR_SHIFT_PX
     std[:2, 3] = gain * _PRIOR_PARALLAX, gain * _PRIOR_PARALLAX_DOWN
     # Of a lens of usual width (53° across) the focal length is as long as the picture is wide.
@@ -171,10 +175,14 @@ def _prior(
     centre[2, :2] = turned
     std[2, :2] = np.hypot(_PRIOR_PERSPECTIVE / half, _PRIOR_TURN * np.abs(turned))
     # Cameras that are far apart are no such pair: then the first map says more than this.
-    std[2, :2] = np.maximum(std[2, :2], _FAR_OFF * np.abs(first.matrix[2, :2] - turned))
+    std[2, :2] = np.maximum(std[2, :2], _FAR_OFF * np.abs(matrix[2, :2] - turned))
     std[2, 3] = _PRIOR_PARALLAX_DEPTH / half
-    ends = [first.offset_s, 0.0], [_PRIOR_OFFSET_S, _PRIOR_DRIFT_PPM]
-    return np.append(centre.ravel()[_FREE], ends[0]), np.append(std.ravel()[_FREE], ends[1])
+    lenses = first.way.free - len(ONE_IS_FIXED)
+    ends = (
+        [*np.zeros(lenses), first.offset_s, 0.0],
+        [*np.full(lenses, _PRIOR_K1), _PRIOR_OFFSET_S, _PRIOR_DRIFT_PPM],
+    )
+    return np.append(centre.ravel()[ONE_IS_FIXED], ends[0]), np.append(std.ravel()[ONE_IS_FIXED], ends[1])
 
 
 def _path(ours: TrackMeasurements, theirs: TrackMeasurements, clock: ClockConfig) -> _Path:
@@ -212,7 +220,7 @@ def _rows(
     other = _measured(path, when, there)
     m = len(scale)
     J = np.zeros((len(when), 2, m))
-    J[:, :, : len(_FREE)] = way.jacobian(path.theirs.centre, path.theirs.size[:, 1])
+    J[:, :, :-_CLOCK] = way.jacobian(path.theirs.centre, path.theirs.size[:, 1])
     J[:, :, -2] = other.velocity
     J[:, :, -1] = _PPM * (path.theirs.t - unknowns.at_s)[:, None] * other.velocity
     J *= scale
@@ -348,24 +356,21 @@ def _largest_move(way: PictureMap, step: FloatArray, paths: list[_Path]) -> floa
     """By how much a step of the unknowns moves the mapped measurements at most (px)."""
     centre = np.concatenate([path.theirs.centre for path in paths])
     height = np.concatenate([path.theirs.size[:, 1] for path in paths])
-    moved = way.jacobian(centre, height) @ step[: len(_FREE)]
+    moved = way.jacobian(centre, height) @ step[:-_CLOCK]
     return float(np.nanmax(np.abs(moved)))
 
 
 def _result(
     unknowns: _Unknowns,
-    solved: SharedPaths,
     scale: FloatArray,
     paths: list[_Path],
     sigma: tuple[float, ...],
+    sizes: tuple[tuple[float, float], tuple[float, float]],
 ) -> Refined:
-    """Covariances from the scatter between vehicles, as the errors of one have memory (a sandwich)."""
+    """Covariances from the scatter between vehicles, as the errors of one have memory."""
     rows, residuals = zip(*(_rows(path, unknowns, sigma, scale) for path in paths), strict=True)
     last = solve_paths(rows, np.eye(len(scale)), np.zeros(len(scale)))
-    inverse = np.linalg.inv(last.information.sum(axis=0) + last.prior)
-    scatter = last.vector.T @ last.vector
-    cov = inverse @ (scatter + last.prior) @ inverse * np.outer(scale, scale)
-    cov = 0.5 * (cov + cov.T)
+    cov = jackknife(last) * np.outer(scale, scale)
     size = [np.sqrt(path.ours.size.prod(axis=1)) for path in paths]
     other = [np.sqrt(unknowns.way.boxes(_boxes(path.theirs))[0][:, 2:].prod(axis=1)) for path in paths]
     rms = []
@@ -375,7 +380,7 @@ def _result(
             for one, s in zip(residuals, own, strict=True)
         ]
         rms.append(float(np.sqrt(np.mean(np.concatenate(px) ** 2))))
-    free = len(_FREE)
+    free = unknowns.way.free
     clock = ClockConfig(
         offset_s=no_smaller(unknowns.offset_s),
         drift_ppm=no_smaller(unknowns.drift_ppm),
@@ -383,5 +388,32 @@ def _result(
         offset_std_s=no_smaller(float(np.sqrt(cov[free, free]))),
         drift_std_ppm=no_smaller(float(np.sqrt(cov[free + 1, free + 1]))),
     )
-    way = PictureMap(unknowns.matrix, cov[:free, :free])
-    return Refined(way, clock, (rms[0], rms[1]), float(np.mean(np.concatenate(size))), len(paths))
+    way = replace(unknowns.way, covariance=cov[:free, :free])
+    return Refined(
+        way,
+        clock,
+        (rms[0], rms[1]),
+        float(np.mean(np.concatenate(size))),
+        len(paths),
+        None if way.lenses is not None else _lens_evidence(unknowns, paths, sigma, sizes),
+    )
+
+
+def _lens_evidence(
+    unknowns: _Unknowns,
+    paths: list[_Path],
+    sigma: tuple[float, ...],
+    sizes: tuple[tuple[float, float], tuple[float, float]],
+) -> LensEvidence:
+    """Test whether the lenses bend, about the best map between lenses that do not."""
+    bending = unknowns._replace(way=with_lenses(unknowns.way, sizes))
+    _, scale = _prior(bending, *sizes)
+    rows = [_rows(path, bending, sigma, scale)[0] for path in paths]
+    solved = solve_paths(rows, np.eye(len(scale)), np.zeros(len(scale)))
+    return lens_evidence(solved, slice(-_CLOCK - LENSES, -_CLOCK))
+
+
+def with_lenses(way: PictureMap, sizes: tuple[tuple[float, float], tuple[float, float]]) -> PictureMap:
+    """Give a map lenses that may bend but do not yet; `sizes` are those of the common and the own picture."""
+    lenses = RadialLens.of_picture(0.0, sizes[1]), RadialLens.of_picture(0.0, sizes[0])
+    return replace(way, lenses=lenses)

@@ -15,13 +15,14 @@ import numpy as np
 from jeat_graph.config.sensors import ClockConfig
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.in_steps import run_through, worth
-from jeat_graph.data.picture_map import PictureMap
+from jeat_graph.data.picture_map import LENSES, PictureMap
+from jeat_graph.rig.between_vehicles import LensEvidence
 from jeat_graph.rig.clock_search import offset_of, rank_offsets
 from jeat_graph.rig.matching import MatchedTracks, match_again, match_at, no_tracks
-from jeat_graph.rig.refining import Refined, no_smaller, refine
+from jeat_graph.rig.refining import Refined, no_smaller, refine, with_lenses
 from jeat_graph.rig.sensor_tracks import SensorTracks, joined
 
-# Rough differences of the clocks that are tried, and rounds of matching and refining.
+# Rough differences of the clocks that are tried; rounds of matching and fitting where the map is known.
 _CANDIDATES, _ROUNDS = 4, 2
 # What a round of matching is worth in steps of about a millisecond.
 _MATCHING_STEPS = 16
@@ -35,6 +36,8 @@ _OTHER_S = 0.35
 # How uncertain a result may be: boxes, as a share of their size; the clock (s). Several lanes tell the map to
 # .02 to .06 sizes; one lane says that it tells it to .2 to .4, and is off by more.
 _MOST_SIZES, _MOST_CLOCK_S = 0.12, 0.02
+# Lenses bend where vehicles would say so of straight ones as rarely as this.
+_BENDS = 1e-3
 # Vehicles whose paths lie within so many sizes of each other drive in one lane (.2 to .5; 5 to 6 in several).
 _ONE_LANE, _LANE_QUANTILES = 1.5, (0.05, 0.95)
 
@@ -82,20 +85,23 @@ def register_by_traffic(
     matched = _best(first, second, names) if start is None else match_again(first, second, start)
     _check_matches(matched, names)
 
-    def refine_and_match() -> tuple[Refined, MatchedTracks]:
-        refined = refine(first, second, matched, sizes)
+    def refine_and_match(rough: bool = False) -> tuple[Refined, MatchedTracks]:
+        refined = refine(first, second, matched, sizes, rough)
         again = match_again(first, second, matched._replace(way=refined.way, offset_s=refined.clock.offset_s))
         _check_matches(again, names)
         return refined, again
 
     try:
+        _, matched = refine_and_match(rough=True)
         refined, matched = refine_and_match()
-        for _ in range(_ROUNDS - 1):
+        evidence = refined.bends
+        if evidence is not None and evidence.p_value < _BENDS:
+            matched = matched._replace(way=with_lenses(refined.way, sizes), offset_s=refined.clock.offset_s)
             refined, matched = refine_and_match()
     except RuntimeError:
         raise _undetermined(names, "it leaves the map between the pictures open") from None
     _check_certainty(refined, second, matched, names, sizes[1])
-    return Registration(refined.way, refined.clock, _lines(refined, matched, names, sizes[1]))
+    return Registration(refined.way, refined.clock, _lines(refined, matched, names, sizes[1], evidence))
 
 
 def clock_by_map(
@@ -208,7 +214,8 @@ def _check_matches(matched: MatchedTracks, names: tuple[str, str]) -> None:
         raise _undetermined(
             names,
             f"at best {count} of {possible} vehicles have a partner: they look at different roads, or did "
-            "not record at one time",
+            "not record at one time, or face each other (that is not registered; `handover` follows vehicles "
+            "from one to the other)",
         )
     if matched.wrong_map > _MOST_SECOND * count:
         raise _undetermined(
@@ -274,8 +281,23 @@ def _by_place(way: PictureMap, own: tuple[float, float]) -> str:
     return f" ({where[0]}, {where[1]})"
 
 
+def _lens_line(refined: Refined, evidence: LensEvidence | None, names: tuple[str, str]) -> str:
+    """Say whether the lenses bend."""
+    if refined.way.lenses is None:
+        assert evidence is not None
+        return f"{names[1]}: no lens bends that the traffic could tell (p = {evidence.p_value:.2g})"
+    std = np.sqrt(np.diag(refined.way.covariance))[-LENSES:]
+    own, common = (f"{lens.k1:.3f} ± {one:.3f}" for lens, one in zip(refined.way.lenses, std, strict=True))
+    why = "" if evidence is None else f" (p = {evidence.p_value:.1g} that none does)"
+    return f"{names[1]}: the lenses bend{why}: k1 {own} of {names[1]}, {common} of {names[0]}"
+
+
 def _lines(
-    refined: Refined, matched: MatchedTracks, names: tuple[str, str], own: tuple[float, float]
+    refined: Refined,
+    matched: MatchedTracks,
+    names: tuple[str, str],
+    own: tuple[float, float],
+    evidence: LensEvidence | None,
 ) -> list[str]:
     clock, std = refined.clock, refined.way.std_px(own)
     drift = f"drift {clock.drift_ppm:.1f} ± {clock.drift_std_ppm:.1f} ppm"
@@ -285,6 +307,7 @@ def _lines(
         f"{_by_place(refined.way, own)}; "
         f"residuals {refined.residual_px[0]:.2g} px of {names[0]}, {refined.residual_px[1]:.2g} px of "
         f"{names[1]}, of boxes of {refined.sizes_px:.0f} px",
+        _lens_line(refined, evidence, names),
         f"{names[1]}: clock {clock.offset_s:.4f} s ± {1e3 * clock.offset_std_s:.1f} ms ahead at its "
         f"{clock.at_s:.1f} s, {drift}",
     ]

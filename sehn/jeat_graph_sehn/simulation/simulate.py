@@ -51,7 +51,7 @@ def record(
     scenario: Scenario,
     seed: int = 0,
     duration_s: float = DEFAULT_DURATION_S,
-    rig: RigConfig | str | None = None,
+    rig: Rig | RigConfig | str | None = None,
 ) -> SimulatedRecording:
     """Simulate a recording; the same arguments give the same bytes.
 
@@ -59,7 +59,8 @@ def record(
         scenario: the settings.
         seed: non-negative.
         duration_s: length (s).
-        rig: the second camera, that of the sensor `evt`; `drawn` draws one from the seed.
+        rig: the second camera, that of the sensor `evt`; `drawn` draws one from the seed. A `Rig` brings both
+            cameras, and the scenario's is not used: they may have lenses that bend, or face each other.
 
     Raises:
         ConfigError: a seed, a duration or a rig that is not valid, or more traffic than there is road.
@@ -70,7 +71,9 @@ def record(
         raise ConfigError(f"duration: must be a positive number of seconds, got {duration_s}")
     s = scenario if rig is None else _for_rig(scenario, duration_s)
     scene = Scene.build(seed, duration_s, s.road, s.fleet, s.traffic, s.light, s.camera)
-    two = None if rig is None else Rig.beside(scene.camera, _rig_config(rig, seed, scene.camera))
+    two = _two_cameras(rig, seed, scene.camera)
+    if two is not None:
+        scene = replace(scene, camera=two.common)
     spans = ((0.0, duration_s),) * 2 if two is None else two.spans(duration_s)
     parts: list[Detections] = []
     truth: GroundTruth | None = None
@@ -112,12 +115,14 @@ def _for_rig(scenario: Scenario, duration_s: float) -> Scenario:
     return replace(scenario, traffic=replace(traffic, ring_m=ring))
 
 
-def _rig_config(rig: RigConfig | str, seed: int, camera: Camera) -> RigConfig:
-    if isinstance(rig, RigConfig):
+def _two_cameras(rig: Rig | RigConfig | str | None, seed: int, camera: Camera) -> Rig | None:
+    if rig is None or isinstance(rig, Rig):
         return rig
+    if isinstance(rig, RigConfig):
+        return Rig.beside(camera, rig)
     if rig != DRAWN:
         raise ConfigError(f"rig: must be settings of a rig or {DRAWN!r}, not {rig!r}")
-    return draw_rig(stream(seed, "rig"), camera)
+    return Rig.beside(camera, draw_rig(stream(seed, "rig"), camera))
 
 
 def _within(clock: Clock, span: tuple[float, float]) -> Clock:
