@@ -229,9 +229,13 @@ class PictureMap:
         """Return places (N, 2) spread over an own picture of that size, and the same at each (N,), in px."""
         xy, height = _spread(own)
         seen = np.isfinite(self.points(xy, height)).all(axis=1)
-        J = self.jacobian(xy[seen], height[seen])
+        return xy[seen], self.std_of(xy[seen], height[seen])
+
+    def std_of(self, xy: FloatArray, height: FloatArray) -> FloatArray:
+        """Return how uncertain mapped centres (N, 2) of boxes of heights (N,) are: (N,), an axis (px)."""
+        J = self.jacobian(xy, height)
         variance = np.einsum("nij,jk,nik->ni", J, self.covariance, J)
-        return xy[seen], np.sqrt(np.maximum(variance.mean(axis=1), 0.0))
+        return np.asarray(np.sqrt(np.maximum(variance.mean(axis=1), 0.0)))
 
     def gain(self, own: tuple[float, float]) -> float:
         """Return how many common pixels an own one is, in the mean over an own picture of that size."""
