@@ -36,7 +36,7 @@ _BLOCK_S, _BLOCKS, _LEAST_BLOCKS, _OLDEST_S = 1.0, 8, 6, 60.0
 _SIGNIFICANT, _LEAST_S, _MOST_S = 4.0, 0.01, 0.1
 
 
-class _Seen(NamedTuple):
+class _ScanBoxes(NamedTuple):
     """A scan: time (s), centres (M, 2) and sizes (M,) of its boxes (px)."""
 
     t: float
@@ -53,7 +53,7 @@ class _Followed:
         blocks: begin (s), weight, and weighted sum of lags (s) of each mean.
     """
 
-    waiting: deque[_Seen] = field(default_factory=deque)
+    waiting: deque[_ScanBoxes] = field(default_factory=deque)
     blocks: deque[list[float]] = field(default_factory=lambda: deque(maxlen=_BLOCKS))
 
 
@@ -62,7 +62,7 @@ class ClockDrift:
 
     def __init__(self) -> None:
         self._first = ""
-        self._known: deque[_Seen] = deque()  # the first sensor's latest
+        self._known: deque[_ScanBoxes] = deque()  # the first sensor's latest
         self._others: dict[str, _Followed] = {}
 
     def saw(self, scans: Sequence[Scan], first: str) -> dict[str, FoundClock]:
@@ -153,21 +153,23 @@ class ClockDrift:
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go on from what `state` returned."""
         self._first = state["first"]
-        self._known = deque(_Seen(*seen) for seen in state["known"])
+        self._known = deque(_ScanBoxes(*seen) for seen in state["known"])
         self._others = {
             name: _Followed(
-                deque(_Seen(*seen) for seen in waiting),
+                deque(_ScanBoxes(*seen) for seen in waiting),
                 deque((list(block) for block in blocks), maxlen=_BLOCKS),
             )
             for name, (waiting, blocks) in state["others"].items()
         }
 
 
-def _seen(scan: Scan) -> _Seen:
-    return _Seen(scan.t, scan.boxes[:, :2] + 0.5 * scan.boxes[:, 2:], np.sqrt(scan.boxes[:, 2:].prod(axis=1)))
+def _seen(scan: Scan) -> _ScanBoxes:
+    return _ScanBoxes(
+        scan.t, scan.boxes[:, :2] + 0.5 * scan.boxes[:, 2:], np.sqrt(scan.boxes[:, 2:].prod(axis=1))
+    )
 
 
-def _lag_of_scan(scan: _Seen, before: _Seen, after: _Seen) -> tuple[float, float]:
+def _lag_of_scan(scan: _ScanBoxes, before: _ScanBoxes, after: _ScanBoxes) -> tuple[float, float]:
     """Return the weight (1/s²) and the mean lag (s) that the boxes of one scan tell."""
     a, b = _partner(scan, before), _partner(scan, after)
     rows = np.flatnonzero((a >= 0) & (b >= 0))
@@ -185,7 +187,7 @@ def _lag_of_scan(scan: _Seen, before: _Seen, after: _Seen) -> tuple[float, float
     return (weight, float(pull[moving].sum()) / weight) if weight > 0.0 else (0.0, 0.0)
 
 
-def _partner(scan: _Seen, other: _Seen) -> IntArray:
+def _partner(scan: _ScanBoxes, other: _ScanBoxes) -> IntArray:
     """Return the one box of another scan that may be of the same vehicle as each (M,), else -1."""
     if not len(scan.size) or not len(other.size):
         return np.full(len(scan.size), -1, dtype=np.int64)
