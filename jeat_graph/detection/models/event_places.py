@@ -28,7 +28,11 @@ def event_scale(size_px: tuple[int, int], side: tuple[int, int]) -> float:
         size_px: width and height of the camera's picture.
         side: those of the network's input.
     """
-    scale = letterbox_scale(size_px, side)
+    return worth_scale(letterbox_scale(size_px, side))
+
+
+def worth_scale(scale: float) -> float:
+    """Return a scale, or 1 where it enlarges by too little to be worth it."""
     return 1.0 if 1.0 <= scale < _WORTH_SCALING else scale
 
 

@@ -14,7 +14,7 @@ from jeat_graph.data.errors import DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.detection.binned import BinnedDetector, Signal
 from jeat_graph.detection.models.engine import open_engine
-from jeat_graph.detection.models.event_places import EventPlaces, event_scale
+from jeat_graph.detection.models.event_places import EventPlaces, event_scale, worth_scale
 from jeat_graph.detection.models.feeding import letterbox_scale
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, Port, read_onnx_head
@@ -184,7 +184,7 @@ class ModelEventDetector(BinnedDetector):
         elif fits or most == 1:
             scale = event_scale(size_px, self._side)
         else:
-            scale = tiled_scale(size_px, self._side, most)
+            scale = worth_scale(tiled_scale(size_px, self._side, most, own=True))
         places = EventPlaces(size_px, scale)
         tiling = Tiling(places.shown_px, self._side)
         if UNLIMITED < most < len(tiling):
@@ -201,8 +201,8 @@ class ModelEventDetector(BinnedDetector):
         count = len(Tiling(size_px, self._side))
         return (
             f"{self._path.name} is shown the camera at {self._places.scale:.3g} of its size; "
-            f"{self._section}.tiles=0 shows it at its own, in {count} tiles that take "
-            f"{count} times as long as one"
+            f"{self._section}.tiles=0 shows it in {count} tiles at its own size or larger, which takes "
+            f"{count} times as long"
         )
 
     def _elapsed(self, t: float) -> dict[str, npt.NDArray[Any]]:

@@ -97,9 +97,8 @@ class ModelSettings(Section):
     tiles: int = number(
         1,
         "1",
-        "a picture larger than the network's input is shown in at most so many tiles, which overlap, at its "
-        "own size if they suffice; each takes as long as a whole one; 0: as many as that needs; 1: as a "
-        "whole, made smaller",
+        "a picture larger than the network's input is shown in at most so many tiles, which overlap; each "
+        "takes as long as a whole one; 0: as many as its own size needs; 1: as a whole, made smaller",
         0,
         64,
     )

@@ -49,7 +49,8 @@ class ModelPictureDetector:
             found.outputs, self._side, head.notes, self._settings, self._path, coco=True
         )
         layout = self._outputs.layout
-        self.even_score = None if CARD in head.notes else all_layouts()[layout].even_score
+        self._own = CARD in head.notes
+        self.even_score = None if self._own else all_layouts()[layout].even_score
         self.tells_classes = self._outputs.tells_classes
         self._feed = usual_feed(layout, self._settings)
         self._engine = engine()
@@ -88,7 +89,7 @@ class ModelPictureDetector:
     def _in_tiles(self, frame: RgbImage, size_px: tuple[int, int]) -> FoundBoxes:
         import cv2
 
-        scale = tiled_scale(size_px, self._side, self._settings.tiles)
+        scale = tiled_scale(size_px, self._side, self._settings.tiles, own=self._own)
         shown_px = scaled_px(size_px, scale)
         if shown_px != size_px:
             frame = np.asarray(cv2.resize(frame, shown_px), dtype=np.uint8)

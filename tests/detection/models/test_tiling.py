@@ -99,7 +99,8 @@ def test_events_in_tiles_give_the_boxes_of_the_whole_picture(tmp_path, monkeypat
     x, y = (np.tile(one, 3).astype("u2") for one in (x, y))
     lit = EventArray(np.sort(np.linspace(31_000, 70_000, count).astype(int)), x, y, np.ones(count, "u1"))
     late = EventArray(np.array([90_000]), *(np.zeros(1, kind) for kind in ("u2", "u2", "u1")))
-    path = counting_net(tmp_path / "net.onnx", SIDE, 20, ROWS, notes=OWN)
+    path = counting_net(tmp_path / "net.onnx", SIDE, 20, ROWS)
+    # Not of `train`: shown at the camera's own size, so that boxes are exact.
     detector = ModelEventDetector(path, CAMERA, times=FAST, settings=TILES)
     assert "in 256 x 192 px, 9 tiles" in detector.description
     scan = [*detector.push(lit), *detector.push(late)][0]
@@ -113,7 +114,7 @@ def test_pictures_in_tiles_give_the_boxes_of_the_whole_picture(tmp_path, monkeyp
     monkeypatch.setattr(pictures_module, "open_engine", lambda *_: engine)
     expected = vehicles(seed, (120, 90))
     frame = np.repeat(255 * lit_by(expected).astype(np.uint8)[..., None], 3, axis=2)
-    path = constant_net(tmp_path / "net.onnx", {"output0": ROWS[None]}, SIDE, notes=OWN)
+    path = constant_net(tmp_path / "net.onnx", {"output0": ROWS[None]}, SIDE)
     scan = ModelPictureDetector(path, settings=TILES)(frame, 0.0)
     np.testing.assert_allclose(in_order(scan.boxes), in_order(expected), atol=1e-3)
     engine.looks = 0
@@ -159,13 +160,37 @@ def test_tiles_cover_the_canvas_and_share_an_eighth(length):
 
 
 @pytest.mark.parametrize(
-    ("most", "scale", "tiles"),
-    [(0, 1.0, 4), (4, 1.0, 4), (9, 1.0, 4), (3, 0.8, 2), (2, 0.8, 2)],
+    ("most", "own", "scale", "tiles"),
+    [
+        # Two columns of 960 px that share 120 reach over 1800 px, two rows of 576 that share 72 over 1080.
+        (0, True, 1800 / 1280, 4),
+        (4, True, 1800 / 1280, 4),
+        (0, False, 1.0, 4),
+        (3, True, 0.8, 2),  # 576 px high
+        (2, False, 0.8, 2),
+        (20, True, 1.5, 6),  # never larger than in training
+        (20, False, 1.0, 4),
+    ],
 )
-def test_as_many_tiles_as_are_allowed_show_the_camera_largest(most, scale, tiles):
+def test_as_many_tiles_as_are_allowed_show_the_camera_largest(most, own, scale, tiles):
     camera, side = (1280, 720), (960, 576)
-    assert tiled_scale(camera, side, most) == pytest.approx(scale)
+    assert tiled_scale(camera, side, most, own=own) == pytest.approx(scale)
     assert len(Tiling((round(1280 * scale), round(720 * scale)), side)) == tiles
+
+
+def test_boxes_come_back_where_tiles_have_room_to_enlarge_the_camera(tmp_path):
+    """Two columns of 128 px that share 16 reach over 240, two rows of 96 over 180 px: 240 / 180."""
+    box = np.array([[10.0, 20.0, 30.0, 40.0, 0.9, 2.0]])
+    path = counting_net(tmp_path / "rnn.onnx", (128, 96), 20, box, per_event=1.0, notes=OWN)
+    detector = ModelEventDetector(path, (180, 130), times=FAST, settings=TILES)
+    assert " at 1.33 times the camera's, 4 tiles" in detector.description
+    # One event in the middle of the picture, which all tiles see: pixel 119 of 240, and 87 of 173.
+    at = np.array([21_000, 41_000, 90_000])
+    x, y = np.array([5, 89, 5], "u2"), np.array([5, 65, 5], "u2")
+    scan = detector.push(EventArray(at, x, y, np.ones(3, "u1")))[0]
+    lefts, tops = np.array([0, 112]) + 10 + 8 * (1 + 1), np.array([0, 173 - 96]) + 20
+    expected = np.array([(left, top, 20, 20) for left in lefts for top in tops]) * 180 / 240
+    np.testing.assert_allclose(in_order(scan.boxes), in_order(expected), atol=1e-3)
 
 
 def test_each_tile_has_its_own_memory(tmp_path):
