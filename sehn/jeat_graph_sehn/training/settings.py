@@ -161,6 +161,15 @@ class TrainSettings(Section):
     )
     seed: int = number(0, "1", "of first weights, order and changes", 0, 2**31)
     learning_rate: float = number(2e-3, "1", "the highest, of AdamW", 0.0, 1.0, open_low=True)
+    memory_rate: float = number(
+        50.0,
+        "1",
+        "times that rate for how long a memory by time lasts and where it may change, which begin far from "
+        "where they must get",
+        0.0,
+        1000.0,
+        open_low=True,
+    )
     final_share: float = number(0.02, "1", "share of it at the end of the cosine", 0.0, 1.0)
     warm_up_share: float = number(0.03, "1", "share of the training in which the rate rises", 0.0, 0.5)
     settled_share: float = number(

@@ -19,6 +19,7 @@ from jeat_graph_sehn.training.checkpoint import read_checkpoint, write_checkpoin
 from jeat_graph_sehn.training.data_sets import Split
 from jeat_graph_sehn.training.fused_network import FusedNet
 from jeat_graph_sehn.training.judging import judge
+from jeat_graph_sehn.training.lasting import Lasting
 from jeat_graph_sehn.training.learning import cost_of
 from jeat_graph_sehn.training.making import new_network
 from jeat_graph_sehn.training.network import DetectionNet, VehicleNet, cell_places
@@ -107,7 +108,7 @@ class Trainer:
         self.net = net.to(job.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.net).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
-            _groups(self.net, settings.weight_decay), lr=settings.learning_rate, betas=(0.9, 0.99)
+            _groups(self.net, settings), lr=settings.learning_rate, betas=(0.9, 0.99)
         )
         self._places, self._strides = (part.to(job.device) for part in cell_places(settings.crop_px))
         self.step, self.log = 0, list[LogRow]()
@@ -174,7 +175,7 @@ class Trainer:
     def _learn(self, batch: ShownBatch, rate: float) -> None:
         settings, device = self._job.settings, self._job.device
         for group in self._optimiser.param_groups:
-            group["lr"] = rate
+            group["lr"] = rate * group["times"]
         self._optimiser.zero_grad(set_to_none=True)
         state = self._state_before(batch)
         count = len(batch.steps)
@@ -273,9 +274,20 @@ class Trainer:
             raise DataError("is damaged; remove it to start over", self._job.checkpoint) from None
 
 
-def _groups(net: VehicleNet, decay: float) -> Sequence[dict[str, Any]]:
-    """Weights of convolutions are held small; biases and normalisations are free."""
+def _groups(net: VehicleNet, settings: TrainSettings) -> Sequence[dict[str, Any]]:
+    """Weights of convolutions are held small; biases, normalisations and how long a memory lasts are free.
+
+    AdamW moves a weight by the learning rate in a step, whatever the gradient; time constants and gates have
+    farther to go than weights, so theirs is a multiple of it.
+    """
+    lasts = {id(p) for part in net.modules() if isinstance(part, Lasting) for p in part.parameters()}
     learned = [p for p in net.parameters() if p.requires_grad]
-    held = [p for p in learned if p.ndim > 1]
-    free = [p for p in learned if p.ndim <= 1]
-    return [{"params": held, "weight_decay": decay}, {"params": free, "weight_decay": 0.0}]
+    others = [p for p in learned if id(p) not in lasts]
+    groups: list[dict[str, Any]] = [
+        {"params": [p for p in others if p.ndim > 1], "weight_decay": settings.weight_decay, "times": 1.0},
+        {"params": [p for p in others if p.ndim <= 1], "weight_decay": 0.0, "times": 1.0},
+    ]
+    memory = [p for p in learned if id(p) in lasts]
+    if memory:
+        groups.append({"params": memory, "weight_decay": 0.0, "times": settings.memory_rate})
+    return groups

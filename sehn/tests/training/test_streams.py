@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -116,6 +118,25 @@ def test_a_training_from_a_start_may_hold_its_first_layers(small_set, tmp_path):
     assert not any(name.startswith(("backbone.stem", "backbone.to_4")) for name in changed)
     with pytest.raises(ConfigError, match="hold_first"):
         train(TrainRequest((small_set,), tmp_path / "n.onnx", NET, settings))
+
+
+def test_what_a_memory_lasts_moves_faster_than_weights(small_set, tmp_path):
+    members = read_event_segments(small_set)
+    settings = replace(
+        STREAMED, epochs=0.5, judged=1, learning_rate=1e-3, memory_rate=50.0, warm_up_share=0.0
+    )
+    job = TrainingJob(NET, settings, Split(members, members, ""), SIZE, "cpu", tmp_path / "c", "x")
+    trainer = Trainer(job)
+    before = {name: value.clone() for name, value in trainer.net.named_parameters()}
+    trainer.run()
+    moved = {
+        name: float((value - before[name]).abs().max().detach())
+        for name, value in trainer.net.named_parameters()
+    }
+    lasts = [far for name, far in moved.items() if ".lasting." in name]
+    others = [far for name, far in moved.items() if ".lasting." not in name]
+    # AdamW moves by the rate in a step, at most some times as far as its second moment lags behind.
+    assert max(lasts) > 5.0 * max(others) > 0.0
 
 
 def test_pictures_have_no_streams(small_set, tmp_path):
