@@ -47,20 +47,20 @@ class PreviousScan(NamedTuple):
     had_before: BoolArray
 
 
-class RepeatedLogits(NamedTuple):
-    """Sums over boxes that came again at their place, of the logits z before and z' after.
+class PairSums(NamedTuple):
+    """Sums over pairs of numbers (x, y), for their correlation.
 
     Attributes:
         pairs: their number.
-        before, after: Σ z, Σ z'.
-        before_squared, after_squared, product: Σ z², Σ z'², Σ z z'.
+        first, second: Σ x, Σ y.
+        first_squared, second_squared, product: Σ x², Σ y², Σ x y.
     """
 
     pairs: float
-    before: float
-    after: float
-    before_squared: float
-    after_squared: float
+    first: float
+    second: float
+    first_squared: float
+    second_squared: float
     product: float
 
 
@@ -70,22 +70,24 @@ class RepeatCounts(NamedTuple):
     Attributes:
         boxes: (G,) boxes by score, at the logits of `SCORE_GRID`.
         repeated: (G,) those of them that came again in both neighbouring scans.
-        logits: of boxes that came again in the next scan.
+        alike: logits of boxes that came again in the next scan, before and after.
+        lasting: logits, and whether the box came again (1) or not (0).
         scans: number of scans.
         last: the last one; None before the first.
     """
 
     boxes: FloatArray
     repeated: FloatArray
-    logits: RepeatedLogits
+    alike: PairSums
+    lasting: PairSums
     scans: int
     last: PreviousScan | None
 
 
 def no_repetition() -> RepeatCounts:
     """Return the counts of a sensor before its first scan."""
-    none = RepeatedLogits(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return RepeatCounts(np.zeros(len(SCORE_GRID)), np.zeros(len(SCORE_GRID)), none, 0, None)
+    none = PairSums(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return RepeatCounts(np.zeros(len(SCORE_GRID)), np.zeros(len(SCORE_GRID)), none, none, 0, None)
 
 
 def logit(score: FloatArray) -> FloatArray:
@@ -124,7 +126,7 @@ def count_repetition(
         c: constants.
     """
     had_before = np.zeros(len(boxes), dtype=np.bool_)
-    total, repeated, sums = counts.boxes, counts.repeated, counts.logits
+    total, repeated, alike, lasting = counts.boxes, counts.repeated, counts.alike, counts.lasting
     if counts.last is not None:
         last = counts.last
         has_after = np.zeros(len(last.boxes), dtype=np.bool_)
@@ -133,14 +135,16 @@ def count_repetition(
             possible = np.where(overlap >= c.repeat_overlap, overlap, 0.0)
             i, j = assign(possible, c.exact_assignment)
             has_after[i], had_before[j] = True, True
-            z, later = last.logits[i], logits[j]
-            moments = len(z), z.sum(), later.sum(), z @ z, later @ later, z @ later
-            sums = RepeatedLogits(*(float(a + b) for a, b in zip(sums, moments, strict=True)))
+            alike = _added(alike, last.logits[i], logits[j])
+        if len(boxes):
+            lasting = _added(lasting, last.logits, has_after.astype(np.float64))
         if len(last.boxes) and counts.scans > 1:
             kernel = _kernel(last.logits)
             total = total + kernel.sum(axis=1)
             repeated = repeated + kernel @ (has_after & last.had_before)
-    return RepeatCounts(total, repeated, sums, counts.scans + 1, PreviousScan(boxes, logits, had_before))
+    return RepeatCounts(
+        total, repeated, alike, lasting, counts.scans + 1, PreviousScan(boxes, logits, had_before)
+    )
 
 
 def half_as_many(counts: RepeatCounts, c: ModelConstants) -> float:
@@ -165,29 +169,47 @@ def decision_threshold(counts: RepeatCounts, c: ModelConstants) -> float:
     return c.threshold_offset + c.threshold_slope * z
 
 
-def meaning(sums: RepeatedLogits, c: ModelConstants) -> float:
+def meaning(counts: RepeatCounts, c: ModelConstants) -> float:
     """Return the probability that a sensor's scores say something of what its boxes are of.
 
-    Scores that are alike from scan to scan, of different things unlike, have a correlation ρ. By Fisher's
-    transform x = atanh r is normal about atanh ρ with the variance 1/n; atanh ρ has the standard deviation 1
-    where scores have a meaning, and `no_meaning_std` where not (Fisher, "Frequency distribution of the values
-    of the correlation coefficient", Biometrika 10, 1915). Scores of no meaning are spread as widely as a
-    detector's scores are: as far as these are not, because one thing alone is seen, or all have one score,
-    there is nothing to say against them.
+    Then scores are alike from scan to scan, and unlike for unlike things; or boxes that come again have
+    better ones than others. Scores of no meaning are spread as widely as a detector's scores are: as far as
+    these are not, because one thing alone is seen, or all have one score, there is nothing to say against
+    them.
     """
-    n = sums.pairs
-    if n < 1.0:
-        return 1.0
-    variance = sums.before_squared - sums.before**2 / n, sums.after_squared - sums.after**2 / n
-    if not min(variance) > _LEAST_VARIANCE * n:
-        return 1.0
-    spread = math.sqrt(variance[0] * variance[1])
-    r = (sums.product - sums.before * sums.after / n) / spread
+    spread = math.sqrt(math.prod(max(variance, 0.0) for variance in _variances(counts.alike)))
+    odds = math.log(c.no_meaning_share / (1.0 - c.no_meaning_share))
+    odds -= log_factor(counts.alike, c) + log_factor(counts.lasting, c)
+    return 1.0 - float(expit(odds)) * min(1.0, spread / c.agreed_std**2)
+
+
+def log_factor(sums: PairSums, c: ModelConstants) -> float:
+    """Return the log Bayes factor of pairs that have to do with each other, against such as have not.
+
+    By Fisher's transform x = atanh r of their correlation r is normal about atanh ρ with the variance 1/n;
+    atanh ρ has the standard deviation 1 in the one case and `no_meaning_std` in the other (Fisher, "Frequency
+    distribution of the values of the correlation coefficient", Biometrika 10, 1915). r below 0 counts as 0.
+    """
+    n, variance = sums.pairs, _variances(sums)
+    if not min(variance) > _LEAST_VARIANCE:
+        return 0.0
+    covariance = sums.product / n - sums.first * sums.second / n**2
+    r = covariance / math.sqrt(variance[0] * variance[1])
     x = math.atanh(min(max(r, 0.0), _MOST_CORRELATION))
     without, having = 1.0 / n + c.no_meaning_std**2, 1.0 / n + 1.0
-    log_factor = 0.5 * (math.log(without / having) + x * x * (1.0 / without - 1.0 / having))
-    odds = math.log(c.no_meaning_share / (1.0 - c.no_meaning_share)) - log_factor
-    return 1.0 - float(expit(odds)) * min(1.0, spread / (n * c.agreed_std**2))
+    return 0.5 * (math.log(without / having) + x * x * (1.0 / without - 1.0 / having))
+
+
+def _variances(sums: PairSums) -> tuple[float, float]:
+    """Return the variances of both numbers, 0 before anything is counted."""
+    n = max(sums.pairs, 1.0)
+    return sums.first_squared / n - (sums.first / n) ** 2, sums.second_squared / n - (sums.second / n) ** 2
+
+
+def _added(sums: PairSums, x: FloatArray, y: FloatArray) -> PairSums:
+    """Return the sums with pairs (K,), (K,)."""
+    moments = len(x), x.sum(), y.sum(), x @ x, y @ y, x @ y
+    return PairSums(*(float(a + b) for a, b in zip(sums, moments, strict=True)))
 
 
 def _kernel(logits: FloatArray) -> FloatArray:

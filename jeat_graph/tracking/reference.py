@@ -185,7 +185,7 @@ def begin_scan(state: ReferenceState, t: float, scan: SensorScan, c: ModelConsta
     learnt = score_calibration.decision_threshold(counts, c)
     state.sensors.decision_threshold[k] = learnt if math.isnan(even) else even
     weight = state.given_weight[k]
-    learnt_weight = score_calibration.meaning(counts.logits, c)
+    learnt_weight = score_calibration.meaning(counts, c)
     state.sensors.score_weight[k] = learnt_weight if math.isnan(weight) else weight
     period = c.first_period_s if math.isnan(state.period_s[k]) else float(state.period_s[k])
     return ScanClock(t, period, min(1.0, period / c.correlation_time_s))

@@ -109,7 +109,7 @@ def test_scores_above_which_boxes_come_again_are_found():
 
 def _repeated(
     persistent: float, things: int, scans: int, seed: int = 0, std: float = 1.5
-) -> score_calibration.RepeatedLogits:
+) -> score_calibration.RepeatCounts:
     """Things that stand, whose logits have this share of their variance in common from scan to scan."""
     rng = np.random.default_rng(seed)
     counts = score_calibration.no_repetition()
@@ -118,7 +118,7 @@ def _repeated(
     for _ in range(scans):
         logits = 1.0 + std * (own + rng.normal(0.0, np.sqrt(1.0 - persistent), things))
         counts = score_calibration.count_repetition(counts, boxes, logits, C)
-    return counts.logits
+    return counts
 
 
 def test_scores_of_things_have_a_meaning_and_random_ones_none():
@@ -127,32 +127,40 @@ def test_scores_of_things_have_a_meaning_and_random_ones_none():
         assert score_calibration.meaning(_repeated(0.0, 12, 300, seed), C) < 0.5
         # A car that is parked alone, and is as surely found all the time.
         assert score_calibration.meaning(_repeated(0.0, 1, 300, seed, std=0.3), C) > 0.9
-    assert score_calibration.meaning(score_calibration.no_repetition().logits, C) == 1.0
+    assert score_calibration.meaning(score_calibration.no_repetition(), C) == 1.0
     # A detector with one score for all says nothing, but there is nothing against it.
-    same = score_calibration.RepeatedLogits(500.0, 1000.0, 1000.0, 2000.0, 2000.0, 2000.0)
-    assert score_calibration.meaning(same, C) == 1.0
+    assert score_calibration.meaning(_repeated(0.0, 12, 300, 0, std=0.0), C) == 1.0
+
+
+def test_scores_that_are_better_where_boxes_come_again_have_a_meaning():
+    """Those of real things differ by chance alone; what is false does not come again."""
+    rng = np.random.default_rng(4)
+    counts = score_calibration.no_repetition()
+    steady = np.arange(10)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+    for _ in range(100):
+        stray = rng.uniform(0, 1000, (5, 1)) + np.array([[500.0, 500.0, 520.0, 520.0]])
+        logits = np.concatenate([rng.normal(1.5, 1.5, 10), rng.normal(0.0, 1.5, 5)])
+        counts = score_calibration.count_repetition(counts, np.concatenate([steady, stray]), logits, C)
+    assert score_calibration.meaning(counts, C) > 0.99
 
 
 @pytest.mark.parametrize(("things", "scans", "persistent"), [(8, 6, 0.1), (20, 20, 0.05), (12, 60, 0.0)])
-def test_the_weight_of_scores_is_the_posterior_by_integration(things, scans, persistent):
-    sums = _repeated(persistent, things, scans)
+def test_the_evidence_that_scores_have_a_meaning_is_that_by_integration(things, scans, persistent):
+    sums = _repeated(persistent, things, scans).alike
     n = sums.pairs
-    before, after = sums.before / n, sums.after / n
-    covariance = sums.product / n - before * after
-    r = covariance / np.sqrt((sums.before_squared / n - before**2) * (sums.after_squared / n - after**2))
+    first, second = sums.first / n, sums.second / n
+    covariance = sums.product / n - first * second
+    r = covariance / np.sqrt((sums.first_squared / n - first**2) * (sums.second_squared / n - second**2))
     x = np.arctanh(max(r, 0.0))
 
-    def evidence(std: float) -> float:
-        """∫ N(x; m, 1/n) N(m; 0, std²) dm."""
+    def log_evidence(std: float) -> float:
+        """ln ∫ N(x; m, 1/n) N(m; 0, std²) dm."""
         mean = np.linspace(-8.0 * std, 8.0 * std, 200_001)
         density = np.exp(-0.5 * n * (x - mean) ** 2 - 0.5 * (mean / std) ** 2)
-        return float(np.trapezoid(density, mean) * np.sqrt(n) / std / (2.0 * np.pi))
+        return float(np.log(np.trapezoid(density, mean) * np.sqrt(n) / std / (2.0 * np.pi)))
 
-    having, without = evidence(1.0), evidence(C.no_meaning_std)
-    assert C.no_meaning_share == 0.1
-    variance = np.sqrt((sums.before_squared / n - before**2) * (sums.after_squared / n - after**2))
-    want = 1.0 - min(1.0, variance / C.agreed_std**2) * 0.1 * without / (0.9 * having + 0.1 * without)
-    assert score_calibration.meaning(sums, C) == pytest.approx(want, rel=1e-6)
+    want = log_evidence(1.0) - log_evidence(C.no_meaning_std)
+    assert score_calibration.log_factor(sums, C) == pytest.approx(want, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -22,7 +22,8 @@ from jeat_graph.road.lag_table import RoadFile
 from jeat_graph.road.results import empty_road_columns
 
 LAG_S, IMAGE = 0.75, "1280x720"
-SETTINGS = (f"smoother.lag_s={LAG_S}",)
+#: `track` reads what the simulator says of its sensors, a stream has to be told.
+SETTINGS = (f"smoother.lag_s={LAG_S}", "sensors.evt.kind=event", "sensors.rgb.kind=camera")
 COLUMNS = ("t", "x", "y", "speed_kmh", "length", "var_x", "var_y", "var_speed_kmh")
 
 

@@ -12,38 +12,37 @@
 
 namespace jeat::filters {
 
-// Sums over boxes that come again at their place, of both logits (before, after).
-struct RepeatedLogits {
-    double pairs = 0.0, before = 0.0, after = 0.0, before_squared = 0.0, after_squared = 0.0, product = 0.0;
+// Sums over pairs of numbers, for their correlation; the formulas are in filters/score_calibration.py.
+struct PairSums {
+    double pairs = 0.0, first = 0.0, second = 0.0, first_squared = 0.0, second_squared = 0.0, product = 0.0;
 
-    void add(double z, double z_next) {
+    void add(double x, double y) {
         pairs += 1.0;
-        before += z;
-        after += z_next;
-        before_squared += z * z;
-        after_squared += z_next * z_next;
-        product += z * z_next;
+        first += x;
+        second += y;
+        first_squared += x * x;
+        second_squared += y * y;
+        product += x * y;
     }
 
-    // Probability that a box's score says something of what the box is of: 1 before anything is counted.
-    double meaning(const ModelConstants& c) const {
-        if (pairs < 1.0) return 1.0;
-        const double before_variance = before_squared - before * before / pairs,
-                     after_variance = after_squared - after * after / pairs;
-        if (!(std::min(before_variance, after_variance) > kLeastVariance * pairs)) return 1.0;
-        const double spread = std::sqrt(before_variance * after_variance);
-        const double r = clamp((product - before * after / pairs) / spread, 0.0, kMostCorrelation);
+    double first_variance() const { return pairs > 0.0 ? first_squared / pairs - square(first / pairs) : 0.0; }
+    double second_variance() const { return pairs > 0.0 ? second_squared / pairs - square(second / pairs) : 0.0; }
+
+    // Logarithm of how much likelier they are if they have to do with each other than if not.
+    double log_factor(const ModelConstants& c) const {
+        const double one = first_variance(), other = second_variance();
+        if (!(std::min(one, other) > kLeastVariance)) return 0.0;
+        const double covariance = product / pairs - first * second / (pairs * pairs);
+        const double r = clamp(covariance / std::sqrt(one * other), 0.0, kMostCorrelation);
         const double x = 0.5 * (log1p_of(r) - log1p_of(-r));
         const double without = 1.0 / pairs + square(c.no_meaning_std), with = 1.0 / pairs + 1.0;
-        const double log_factor = 0.5 * (log_of(without / with) + x * x * (1.0 / without - 1.0 / with));
-        const double none = expit(log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - log_factor);
-        return 1.0 - none * std::min(1.0, spread / (pairs * square(c.agreed_std)));
+        return 0.5 * (log_of(without / with) + x * x * (1.0 / without - 1.0 / with));
     }
 };
 
 struct RepeatCounts {
     std::array<double, kScoreBins> boxes{}, repeated{};
-    RepeatedLogits logits;
+    PairSums alike, lasting;  // logits of boxes that come again; logits, and whether the box comes again
     std::int64_t scans = 0;
     std::vector<Sides> last_boxes;
     std::vector<double> last_logits;
@@ -65,9 +64,11 @@ struct RepeatCounts {
             for (const std::size_t k : assignment.solve(pairs, last_boxes.size(), now.size(), c.exact_assignment)) {
                 const auto& [i, j, overlap] = pairs[k];
                 has_after[i] = had_before[j] = 1;
-                logits.add(last_logits[i], new_logits[j]);
+                alike.add(last_logits[i], new_logits[j]);
             }
         }
+        for (std::size_t i = 0; i < last_boxes.size() && !now.empty(); ++i)
+            lasting.add(last_logits[i], has_after[i] ? 1.0 : 0.0);
         if (has_last && scans > 1) {
             for (std::size_t i = 0; i < last_boxes.size(); ++i) {
                 const bool again = has_after[i] && last_had_before[i];
@@ -105,6 +106,14 @@ struct RepeatCounts {
                 count(bin, share);
             }
         }
+    }
+
+    // Probability that a box's score says something of what the box is of; 1 before anything is counted.
+    double meaning(const ModelConstants& c) const {
+        const double spread = std::sqrt(std::max(alike.first_variance(), 0.0) * std::max(alike.second_variance(), 0.0));
+        const double odds =
+            log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - alike.log_factor(c) - lasting.log_factor(c);
+        return 1.0 - expit(odds) * std::min(1.0, spread / square(c.agreed_std));
     }
 
     double half_as_many(const ModelConstants& c) const {

@@ -19,6 +19,16 @@ void visit_table(Visitor& v, const std::string& prefix, Table& table, std::size_
     });
 }
 
+template <class Visitor> void visit_pairs(Visitor& v, const std::string& prefix, PairSums& sums) {
+    auto& [pairs, first, second, first_squared, second_squared, product] = sums;
+    v.numbers(prefix + "pairs", &pairs, 1);
+    v.numbers(prefix + "first", &first, 1);
+    v.numbers(prefix + "second", &second, 1);
+    v.numbers(prefix + "first_squared", &first_squared, 1);
+    v.numbers(prefix + "second_squared", &second_squared, 1);
+    v.numbers(prefix + "product", &product, 1);
+}
+
 template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix, Sensor& sensor) {
     auto& [leftovers, false_boxes, boxes_at_edge, boxes_beyond, period_s, last_scan_s, repetition, even_logit,
            given_weight, given_lasting, mean_spread] = sensor;
@@ -32,18 +42,13 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
     v.numbers(prefix + "given_weight", &given_weight, 1, Values::any);
     v.numbers(prefix + "given_lasting", &given_lasting, 1, Values::any);
     v.numbers(prefix + "mean_spread", &mean_spread, 1, Values::any);
-    auto& [boxes, repeated, logits, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
+    auto& [boxes, repeated, alike, lasting, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
     std::size_t rows = last_boxes.size();
     v.whole(prefix + "rows", rows);
     v.numbers(prefix + "boxes", boxes.data(), boxes.size());
     v.numbers(prefix + "repeated", repeated.data(), repeated.size());
-    auto& [pairs, before, after, before_squared, after_squared, product] = logits;
-    v.numbers(prefix + "logits.pairs", &pairs, 1);
-    v.numbers(prefix + "logits.before", &before, 1);
-    v.numbers(prefix + "logits.after", &after, 1);
-    v.numbers(prefix + "logits.before_squared", &before_squared, 1);
-    v.numbers(prefix + "logits.after_squared", &after_squared, 1);
-    v.numbers(prefix + "logits.product", &product, 1);
+    visit_pairs(v, prefix + "alike.", alike);
+    visit_pairs(v, prefix + "lasting.", lasting);
     v.whole(prefix + "scans", scans);
     v.column(prefix + "last_boxes", last_boxes, rows, 1);
     v.column(prefix + "last_logits", last_logits, rows, 1);

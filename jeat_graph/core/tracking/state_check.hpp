@@ -84,11 +84,12 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
         check_between(name + "boxes", boxes, 0.0, kMostCount);
         check_between(name + "repeated", repeated, 0.0, boxes * (1.0 + kShareRounding));
     }
-    const RepeatedLogits& logits = counts.logits;
-    for (const double count : {logits.pairs, logits.before_squared, logits.after_squared})
-        check_between(name + "logits", count, 0.0, kMostCount);
-    for (const double sum : {logits.before, logits.after, logits.product})
-        check_between(name + "logits", sum, -kMostCount, kMostCount);
+    for (const PairSums* sums : {&counts.alike, &counts.lasting}) {
+        for (const double count : {sums->pairs, sums->first_squared, sums->second_squared})
+            check_between(name + "pairs", count, 0.0, kMostCount);
+        for (const double sum : {sums->first, sums->second, sums->product})
+            check_between(name + "pairs", sum, -kMostCount, kMostCount);
+    }
     require(counts.scans <= kMostIdentities, name + "scans", "are too many");
     check_between(name + "last_logits", counts.last_logits, -kMostLogVariance, kMostLogVariance);
     for (const Sides& box : counts.last_boxes)

@@ -59,7 +59,7 @@ ScanClock begin_scan(State& state, double t, const Scan& scan, association::Assi
     state.belief.decision_threshold[scan.sensor] =
         std::isnan(sensor.even_logit) ? sensor.repetition.decision_threshold(c) : sensor.even_logit;
     state.belief.score_weight[scan.sensor] =
-        std::isnan(sensor.given_weight) ? sensor.repetition.logits.meaning(c) : sensor.given_weight;
+        std::isnan(sensor.given_weight) ? sensor.repetition.meaning(c) : sensor.given_weight;
     const double period = std::isnan(sensor.period_s) ? c.first_period_s : sensor.period_s;
     return {t, period, c};
 }
