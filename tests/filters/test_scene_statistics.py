@@ -154,7 +154,7 @@ def test_the_evidence_that_scores_have_a_meaning_is_that_by_integration(things, 
     x = np.arctanh(max(r, 0.0))
 
     def log_evidence(std: float) -> float:
-        """ln ∫ N(x; m, 1/n) N(m; 0, std²) dm."""
+        """Return ln ∫ N(x; m, 1/n) N(m; 0, std²) dm."""
         mean = np.linspace(-8.0 * std, 8.0 * std, 200_001)
         density = np.exp(-0.5 * n * (x - mean) ** 2 - 0.5 * (mean / std) ** 2)
         return float(np.log(np.trapezoid(density, mean) * np.sqrt(n) / std / (2.0 * np.pi)))
