@@ -179,7 +179,8 @@ def meaning(counts: RepeatCounts, c: ModelConstants) -> float:
     """
     spread = math.sqrt(math.prod(max(variance, 0.0) for variance in _variances(counts.alike)))
     odds = math.log(c.no_meaning_share / (1.0 - c.no_meaning_share))
-    odds -= log_factor(counts.alike, c) + log_factor(counts.lasting, c)
+    # Where all boxes come again, or all move too far to, the second says nothing: it speaks for scores alone.
+    odds -= log_factor(counts.alike, c) + max(log_factor(counts.lasting, c), 0.0)
     return 1.0 - float(expit(odds)) * min(1.0, spread / c.agreed_std**2)
 
 

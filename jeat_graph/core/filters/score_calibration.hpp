@@ -111,8 +111,8 @@ struct RepeatCounts {
     // Probability that a box's score says something of what the box is of; 1 before anything is counted.
     double meaning(const ModelConstants& c) const {
         const double spread = std::sqrt(std::max(alike.first_variance(), 0.0) * std::max(alike.second_variance(), 0.0));
-        const double odds =
-            log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - alike.log_factor(c) - lasting.log_factor(c);
+        const double odds = log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - alike.log_factor(c) -
+                            std::max(lasting.log_factor(c), 0.0);
         return 1.0 - expit(odds) * std::min(1.0, spread / square(c.agreed_std));
     }
 
