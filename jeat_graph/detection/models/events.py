@@ -81,7 +81,7 @@ class ModelEventDetector(BinnedDetector):
         self._input = _window_input(head, self._path)
         bins = (self._input.shape[1] or 0) // 2
         self._side = (self._input.shape[3] or size_px[0], self._input.shape[2] or size_px[1])
-        self._places, self._tiling = self._shown(size_px, own=CARD in head.notes)
+        self._places, self._tiling = self._places_and_tiles(size_px, own=CARD in head.notes)
         self.hint = self._tiles_hint(size_px)
         ring, rate_hz = EventBins(self._places.shown_px, bins, times.bin_s), times.rate(self._usual_hz)
         super().__init__(size_px, sensor, rate_hz, ring, bins, times)
@@ -172,7 +172,7 @@ class ModelEventDetector(BinnedDetector):
             inputs[given.name] = state.get(given.name, empty)
         return self._engine.run(inputs)
 
-    def _shown(self, size_px: tuple[int, int], *, own: bool) -> tuple[EventPlaces, Tiling]:
+    def _places_and_tiles(self, size_px: tuple[int, int], *, own: bool) -> tuple[EventPlaces, Tiling]:
         """Return where a network that `train` made (`own`), or another, sees a camera, and its tiles.
 
         Raises:
