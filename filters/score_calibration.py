@@ -6,8 +6,8 @@ sensor's best boxes. z₀ is the logit below which that share is under one half,
 logits is θ = b₀ + b₁ · clip(z₀), with b₀ and b₁ measured on real detectors.
 False boxes that repeat make z₀ too low: it bounds, and hits, misses and other sensors tell the rest.
 
-And whether scores say anything at all: those of one thing are alike from scan to scan (correlations of .45 to
-.93 in real detectors), or they are no property of the thing, and no evidence of what it is.
+It also tests whether scores are evidence at all. The scores of one object correlate from scan to scan (.45 to
+.93 in real detectors); where they do not, they are no property of the object.
 """
 
 from __future__ import annotations
@@ -70,16 +70,16 @@ class RepeatCounts(NamedTuple):
     Attributes:
         boxes: (G,) boxes by score, at the logits of `SCORE_GRID`.
         repeated: (G,) those of them that came again in both neighbouring scans.
-        alike: logits of boxes that came again in the next scan, before and after.
-        lasting: logits, and whether the box came again (1) or not (0).
+        persistence: logits of boxes that came again in the next scan, before and after.
+        recurrence: logits, and whether the box came again (1) or not (0).
         scans: number of scans.
         last: the last one; None before the first.
     """
 
     boxes: FloatArray
     repeated: FloatArray
-    alike: PairSums
-    lasting: PairSums
+    persistence: PairSums
+    recurrence: PairSums
     scans: int
     last: PreviousScan | None
 
@@ -126,7 +126,8 @@ def count_repetition(
         c: constants.
     """
     had_before = np.zeros(len(boxes), dtype=np.bool_)
-    total, repeated, alike, lasting = counts.boxes, counts.repeated, counts.alike, counts.lasting
+    total, repeated = counts.boxes, counts.repeated
+    persistence, recurrence = counts.persistence, counts.recurrence
     if counts.last is not None:
         last = counts.last
         has_after = np.zeros(len(last.boxes), dtype=np.bool_)
@@ -135,15 +136,15 @@ def count_repetition(
             possible = np.where(overlap >= c.repeat_overlap, overlap, 0.0)
             i, j = assign(possible, c.exact_assignment)
             has_after[i], had_before[j] = True, True
-            alike = _added(alike, last.logits[i], logits[j])
+            persistence = _added(persistence, last.logits[i], logits[j])
         if len(boxes):
-            lasting = _added(lasting, last.logits, has_after.astype(np.float64))
+            recurrence = _added(recurrence, last.logits, has_after.astype(np.float64))
         if len(last.boxes) and counts.scans > 1:
             kernel = _kernel(last.logits)
             total = total + kernel.sum(axis=1)
             repeated = repeated + kernel @ (has_after & last.had_before)
     return RepeatCounts(
-        total, repeated, alike, lasting, counts.scans + 1, PreviousScan(boxes, logits, had_before)
+        total, repeated, persistence, recurrence, counts.scans + 1, PreviousScan(boxes, logits, had_before)
     )
 
 
@@ -172,15 +173,15 @@ def decision_threshold(counts: RepeatCounts, c: ModelConstants) -> float:
 def meaning(counts: RepeatCounts, c: ModelConstants) -> float:
     """Return the probability that a sensor's scores say something of what its boxes are of.
 
-    Then scores are alike from scan to scan, and unlike for unlike things; or boxes that come again have
-    better ones than others. Scores of no meaning are spread as widely as a detector's scores are: as far as
-    these are not, because one thing alone is seen, or all have one score, there is nothing to say against
-    them.
+    If they do, the scores of one object correlate from scan to scan, or boxes that come again have higher
+    scores than others. If they do not, their variance is that of all scores of a detector. A small variance,
+    as of one object seen alone or of equal scores, is therefore no evidence against them.
     """
-    spread = math.sqrt(math.prod(max(variance, 0.0) for variance in _variances(counts.alike)))
+    before, after = _variances(counts.persistence)
+    spread = math.sqrt(max(before, 0.0) * max(after, 0.0))
     odds = math.log(c.no_meaning_share / (1.0 - c.no_meaning_share))
     # Where all boxes come again, or all move too far to, the second says nothing: it speaks for scores alone.
-    odds -= log_factor(counts.alike, c) + max(log_factor(counts.lasting, c), 0.0)
+    odds -= log_factor(counts.persistence, c) + max(log_factor(counts.recurrence, c), 0.0)
     return 1.0 - float(expit(odds)) * min(1.0, spread / c.agreed_std**2)
 
 

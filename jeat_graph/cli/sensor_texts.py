@@ -48,8 +48,8 @@ def sensor_texts(config: Config, learnt: Mapping[str, Any]) -> list[str]:
                 parts.append(f"its scores count {sensor.score_weight:g} times (as given)")
         elif isinstance(weight, float) and weight < _MEANS:
             parts.append(
-                f"its scores count {weight:.2g} times: those of one thing are no more alike from scan to "
-                "scan than those of different things"
+                f"its scores count {weight:.2g} times: they do not correlate from scan to scan, so they are "
+                "no property of what its boxes show"
             )
         if parts:
             lines.append(f"sensor {name}: {'; '.join(parts)}")

@@ -194,9 +194,9 @@ def _partner(scan: _ScanBoxes, other: _ScanBoxes) -> IntArray:
     apart = np.linalg.norm(scan.centre[:, None] - other.centre[None], axis=2)
     ratio = scan.size[:, None] / other.size[None]
     near = (apart < _REACH * np.maximum(scan.size[:, None], other.size[None])) & (ratio > 0.0)
-    alike = near & (np.maximum(ratio, 1.0 / np.maximum(ratio, 1e-9)) < _SAME_SIZE)
+    similar = near & (np.maximum(ratio, 1.0 / np.maximum(ratio, 1e-9)) < _SAME_SIZE)
     # Of a box that two of the scan's could be of, nobody knows either.
-    good = (near.sum(axis=1) == 1) & alike.any(axis=1)
+    good = (near.sum(axis=1) == 1) & similar.any(axis=1)
     chosen = near.argmax(axis=1)
     good &= near.sum(axis=0)[chosen] == 1
     return np.asarray(np.where(good, chosen, -1), dtype=np.int64)

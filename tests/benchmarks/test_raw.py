@@ -175,17 +175,22 @@ def test_data_must_be_named(capsys):
     assert "give DATA" in capsys.readouterr().err
 
 
+def two_vehicles(times, boxes):
+    """Truth of vehicles 1 and 2 at times (T,); boxes (2 T, 4), of both at each time."""
+    return GroundTruth(
+        t=np.repeat(times, 2),
+        object_id=np.tile([1, 2], len(times)),
+        boxes=np.array(boxes),
+        motion=None,
+        ignore=np.zeros(2 * len(times), dtype=bool),
+    )
+
+
 def test_who_stands_is_not_asked_of_those_who_see_motion():
     """Vehicle 1 goes 20 px/s, so 1 px within 50 ms; vehicle 2 stands."""
     times = np.arange(5) * 0.05
     boxes = [[x, 0.0, 10.0, 10.0] for t in times for x in (20.0 * t, 50.0)]
-    truth = GroundTruth(
-        t=np.repeat(times, 2),
-        object_id=np.tile([1, 2], 5),
-        boxes=np.array(boxes),
-        motion=None,
-        ignore=np.zeros(10, dtype=bool),
-    )
+    truth = two_vehicles(times, boxes)
     ignored = only_moved(truth).ignore.reshape(5, 2)
     assert ignored[:, 1].all()
     assert ignored[:, 0].tolist() == [True, False, False, False, False]
@@ -195,13 +200,7 @@ def test_who_has_stopped_is_told_from_who_never_went():
     """Vehicle 1 goes 40 px/s for 0.2 s and stands then; vehicle 2 always stands."""
     times = np.arange(12) * 0.05
     boxes = [[x, 0.0, 10.0, 10.0] for t in times for x in (40.0 * min(t, 0.2), 50.0)]
-    truth = GroundTruth(
-        t=np.repeat(times, 2),
-        object_id=np.tile([1, 2], 12),
-        boxes=np.array(boxes),
-        motion=None,
-        ignore=np.zeros(24, dtype=bool),
-    )
+    truth = two_vehicles(times, boxes)
     asked = ~only_stopped(truth).ignore.reshape(12, 2)
     assert not asked[:, 1].any()
     assert asked[:, 0].tolist() == [bool(t > 0.4 - 1e-9) for t in times]

@@ -146,7 +146,7 @@ def test_scores_that_are_better_where_boxes_come_again_have_a_meaning():
 
 @pytest.mark.parametrize(("things", "scans", "persistent"), [(8, 6, 0.1), (20, 20, 0.05), (12, 60, 0.0)])
 def test_the_evidence_that_scores_have_a_meaning_is_that_by_integration(things, scans, persistent):
-    sums = _repeated(persistent, things, scans).alike
+    sums = _repeated(persistent, things, scans).persistence
     n = sums.pairs
     first, second = sums.first / n, sums.second / n
     covariance = sums.product / n - first * second

@@ -42,7 +42,7 @@ struct PairSums {
 
 struct RepeatCounts {
     std::array<double, kScoreBins> boxes{}, repeated{};
-    PairSums alike, lasting;  // logits of boxes that come again; logits, and whether the box comes again
+    PairSums persistence, recurrence;  // logits of boxes that come again; logits, and whether the box comes again
     std::int64_t scans = 0;
     std::vector<Sides> last_boxes;
     std::vector<double> last_logits;
@@ -64,11 +64,11 @@ struct RepeatCounts {
             for (const std::size_t k : assignment.solve(pairs, last_boxes.size(), now.size(), c.exact_assignment)) {
                 const auto& [i, j, overlap] = pairs[k];
                 has_after[i] = had_before[j] = 1;
-                alike.add(last_logits[i], new_logits[j]);
+                persistence.add(last_logits[i], new_logits[j]);
             }
         }
         for (std::size_t i = 0; i < last_boxes.size() && !now.empty(); ++i)
-            lasting.add(last_logits[i], has_after[i] ? 1.0 : 0.0);
+            recurrence.add(last_logits[i], has_after[i] ? 1.0 : 0.0);
         if (has_last && scans > 1) {
             for (std::size_t i = 0; i < last_boxes.size(); ++i) {
                 const bool again = has_after[i] && last_had_before[i];
@@ -110,9 +110,10 @@ struct RepeatCounts {
 
     // Probability that a box's score says something of what the box is of; 1 before anything is counted.
     double meaning(const ModelConstants& c) const {
-        const double spread = std::sqrt(std::max(alike.first_variance(), 0.0) * std::max(alike.second_variance(), 0.0));
-        const double odds = log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - alike.log_factor(c) -
-                            std::max(lasting.log_factor(c), 0.0);
+        const double spread =
+            std::sqrt(std::max(persistence.first_variance(), 0.0) * std::max(persistence.second_variance(), 0.0));
+        const double odds = log_of(c.no_meaning_share / (1.0 - c.no_meaning_share)) - persistence.log_factor(c) -
+                            std::max(recurrence.log_factor(c), 0.0);
         return 1.0 - expit(odds) * std::min(1.0, spread / square(c.agreed_std));
     }
 

@@ -42,13 +42,14 @@ template <class Visitor> void visit_sensor(Visitor& v, const std::string& prefix
     v.numbers(prefix + "given_weight", &given_weight, 1, Values::any);
     v.numbers(prefix + "given_lasting", &given_lasting, 1, Values::any);
     v.numbers(prefix + "mean_spread", &mean_spread, 1, Values::any);
-    auto& [boxes, repeated, alike, lasting, scans, last_boxes, last_logits, last_had_before, has_last] = repetition;
+    auto& [boxes, repeated, persistence, recurrence, scans, last_boxes, last_logits, last_had_before, has_last] =
+        repetition;
     std::size_t rows = last_boxes.size();
     v.whole(prefix + "rows", rows);
     v.numbers(prefix + "boxes", boxes.data(), boxes.size());
     v.numbers(prefix + "repeated", repeated.data(), repeated.size());
-    visit_pairs(v, prefix + "alike.", alike);
-    visit_pairs(v, prefix + "lasting.", lasting);
+    visit_pairs(v, prefix + "persistence.", persistence);
+    visit_pairs(v, prefix + "recurrence.", recurrence);
     v.whole(prefix + "scans", scans);
     v.column(prefix + "last_boxes", last_boxes, rows, 1);
     v.column(prefix + "last_logits", last_logits, rows, 1);

@@ -84,7 +84,7 @@ inline void check_sensor(const std::string& name, const Sensor& sensor, double n
         check_between(name + "boxes", boxes, 0.0, kMostCount);
         check_between(name + "repeated", repeated, 0.0, boxes * (1.0 + kShareRounding));
     }
-    for (const PairSums* sums : {&counts.alike, &counts.lasting}) {
+    for (const PairSums* sums : {&counts.persistence, &counts.recurrence}) {
         for (const double count : {sums->pairs, sums->first_squared, sums->second_squared})
             check_between(name + "pairs", count, 0.0, kMostCount);
         for (const double sum : {sums->first, sums->second, sums->product})
