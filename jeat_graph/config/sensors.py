@@ -53,7 +53,7 @@ class SensorConfig(Section):
         None,
         "1",
         "weight of its scores as evidence for or against an object; 0: none; without it 1, and less where "
-        "its scores turn out to say nothing",
+        "its scores turn out to say nothing beside other sensors",
         0.0,
         10.0,
     )

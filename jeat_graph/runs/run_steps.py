@@ -37,6 +37,8 @@ STEPS_PER_DRAIN = 256
 STEPS_PER_SAVE = 40 * STEPS_PER_DRAIN
 # Of so many detections most belong to vehicles: a smaller share than this in tracks is a warning.
 _MANY, _LEAST_TRACKED = 100, 0.05
+#: Quantile of a sensor's scores below which most of them are.
+_MOSTLY = 0.8
 
 
 class RunSteps:
@@ -227,10 +229,25 @@ class RunSteps:
                 "be reported: see the column existence of a run without this setting"
             )
         if detections >= _MANY and rows < _LEAST_TRACKED * detections:
-            return (
-                f"{rows} rows of tracks from {detections} detections: nearly all of them are taken for "
-                "false; are the sensors' rates and the picture's size right?"
+            taken = (
+                f"{rows} rows of tracks from {detections} detections: nearly all of them are taken for false"
             )
+            return f"{taken}; " + (
+                self._low_scores() or "are the sensors' rates and the picture's size right?"
+            )
+        return None
+
+    def _low_scores(self) -> str | None:
+        """Return what to do if a sensor's scores are what its boxes are taken for false by."""
+        owner = np.repeat(self._detections.scan_sensor, np.diff(self._detections.scan_start))
+        for k, (name, state) in enumerate(self._tracker.sensor_states().items()):
+            scores = self._detections.scores[owner == k]
+            if len(scores) and np.quantile(scores, _MOSTLY) < state.even_score:
+                half = np.median(scores) / 2
+                return (
+                    f"most scores of {name!r} are below {state.even_score:.2g}, where a box is taken to be as likely "
+                    f"false as real; if its boxes are real, set sensors.{name}.even_score={half:.2g}"
+                )
         return None
 
 

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.special import expit
 
 from jeat_graph.config.schema import Config
 from jeat_graph.config.sensors import EVENT, SensorConfig
@@ -150,6 +151,7 @@ class OneModel(SmoothsRecords):
                 noise_scale=float(noise[k]),
                 lasting_error=float(learnt.lasting_error[k]),
                 score_weight=float(belief.score_weight[k]),
+                even_score=float(expit(belief.decision_threshold[k])),
                 spread_factor=float(np.sqrt(learnt.spread_gain[k])),
                 offset_centre_share=(offsets[k][0], offsets[k][1]),
                 offset_log_size=(offsets[k][2], offsets[k][3]),

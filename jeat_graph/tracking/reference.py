@@ -184,11 +184,20 @@ def begin_scan(state: ReferenceState, t: float, scan: SensorScan, c: ModelConsta
     even = state.even_logit[k]
     learnt = score_calibration.decision_threshold(counts, c)
     state.sensors.decision_threshold[k] = learnt if math.isnan(even) else even
-    weight = state.given_weight[k]
-    learnt_weight = score_calibration.meaning(counts, c)
-    state.sensors.score_weight[k] = learnt_weight if math.isnan(weight) else weight
+    state.sensors.score_weight[k] = _score_weight(state, k, c)
     period = c.first_period_s if math.isnan(state.period_s[k]) else float(state.period_s[k])
     return ScanClock(t, period, min(1.0, period / c.correlation_time_s))
+
+
+def _score_weight(state: ReferenceState, k: int, c: ModelConstants) -> float:
+    """Return how much a sensor's scores count: as given, or as learnt where others can contradict them.
+
+    With one sensor alone nothing else tells what is real: there its scores count in full.
+    """
+    if not math.isnan(state.given_weight[k]):
+        return float(state.given_weight[k])
+    alone = sum(counts.scans > 0 for counts in state.repetition) < 2
+    return 1.0 if alone else score_calibration.meaning(state.repetition[k], c)
 
 
 def predict(state: ReferenceState, t: float, c: ModelConstants) -> FloatArray:

@@ -17,6 +17,7 @@ class SensorState(NamedTuple):
         stationary_unseen: share of the others that it does not detect while they stand.
         lasting_error: standard deviation of what its boxes are off as long as they show one object (sizes).
         score_weight: weight of its scores as evidence: less than 1 where they turn out to say nothing.
+        even_score: score at which its boxes are as likely real as false, by their scores alone.
         spread_factor: by which the standard deviations that it gives with its boxes are multiplied;
             1 where it gives none.
         offset_centre_share: offset of its boxes' centres from those of the other sensors, as a share of the
@@ -32,6 +33,7 @@ class SensorState(NamedTuple):
     stationary_unseen: float = float("nan")
     lasting_error: float = float("nan")
     score_weight: float = float("nan")
+    even_score: float = float("nan")
     spread_factor: float = float("nan")
     offset_centre_share: tuple[float, float] = (0.0, 0.0)
     offset_log_size: tuple[float, float] = (0.0, 0.0)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from jeat_graph import Detections, GroundTruth, Tracker, Trajectories, evaluate, load_config, track
+from jeat_graph.cli.main import main
 
 DURATION_S, IMAGE, NOISE_PX, FOUND = 36.0, (1280, 720), 2.0, 0.91
 #: Top (px) and speed (px/s) of each lane: vehicles drive two to four times their size in a second.
@@ -76,7 +80,29 @@ def test_at_ten_scans_a_second_next_to_every_vehicle_is_followed(seed):
     assert mota(track(detections, image=IMAGE).causal, truth) > 90.0
 
 
+def test_the_random_scores_of_a_sensor_that_is_alone_keep_their_weight():
+    """Nothing else says what is real."""
+    detections, truth = highway(10.0, 0)
+    random = np.random.default_rng(0).uniform(0.05, 1.0, len(detections))
+    tracks = track(replace(detections, scores=random), image=IMAGE)
+    assert mota(tracks.causal, truth) > 90.0
+
+
 @pytest.mark.parametrize(("rate_hz", "least"), [(1.5, 30.0), (2.0, 55.0), (5.0, 80.0)])
 def test_with_few_scans_a_second_most_vehicles_are_followed(rate_hz, least):
     detections, truth = highway(rate_hz, 0)
     assert mota(track(detections, image=IMAGE).causal, truth) > least
+
+
+def test_scores_that_are_all_low_are_named_and_the_setting_that_the_line_names_helps(tmp_path, capsys):
+    detections, truth = highway(10.0, 0)
+    table = detections.to_pandas()
+    table["score"] = table["score"].where(table["score"].isna(), 0.3)
+    table.to_csv(tmp_path / "low.csv", index=False)
+    command = ["track", str(tmp_path / "low.csv"), "--image", "1280x720", "--out", str(tmp_path / "run")]
+    assert main(command) == 0
+    (setting,) = re.findall(
+        r"if its boxes are real, set (sensors\.rgb\.even_score=\S+)", capsys.readouterr().err
+    )
+    low = replace(detections, scores=np.full(len(detections), 0.3))
+    assert mota(track(low, image=IMAGE, config=load_config("default", [setting])).causal, truth) > 90.0

@@ -34,6 +34,15 @@ std::vector<std::size_t> order_of_scans(const State& state, const std::vector<Sc
     return order;
 }
 
+// How much a sensor's scores count: as given, or as learnt where others can contradict them. With one sensor alone
+// nothing else tells what is real: there its scores count in full.
+double score_weight(const State& state, const Sensor& sensor) {
+    if (!std::isnan(sensor.given_weight)) return sensor.given_weight;
+    const auto seen = [](const Sensor& one) { return one.repetition.scans > 0; };
+    const bool alone = std::count_if(state.sensors.begin(), state.sensors.end(), seen) < 2;
+    return alone ? 1.0 : sensor.repetition.meaning(state.constants);
+}
+
 // Take notice of a scan: the sensor's period, its decision threshold, the picture and its edges.
 ScanClock begin_scan(State& state, double t, const Scan& scan, association::Assignment& repeats) {
     const ModelConstants& c = state.constants;
@@ -58,8 +67,7 @@ ScanClock begin_scan(State& state, double t, const Scan& scan, association::Assi
     sensor.repetition.count(scan.boxes, scan.logits, repeats, c);
     state.belief.decision_threshold[scan.sensor] =
         std::isnan(sensor.even_logit) ? sensor.repetition.decision_threshold(c) : sensor.even_logit;
-    state.belief.score_weight[scan.sensor] =
-        std::isnan(sensor.given_weight) ? sensor.repetition.meaning(c) : sensor.given_weight;
+    state.belief.score_weight[scan.sensor] = score_weight(state, sensor);
     const double period = std::isnan(sensor.period_s) ? c.first_period_s : sensor.period_s;
     return {t, period, c};
 }
