@@ -229,11 +229,10 @@ class RunSteps:
                 "be reported: see the column existence of a run without this setting"
             )
         if detections >= _MANY and rows < _LEAST_TRACKED * detections:
-            taken = (
-                f"{rows} rows of tracks from {detections} detections: nearly all of them are taken for false"
-            )
-            return f"{taken}; " + (
-                self._low_scores() or "are the sensors' rates and the picture's size right?"
+            likely = self._low_scores() or "are the sensors' rates and the picture's size right?"
+            return (
+                f"{rows} rows of tracks from {detections} detections: nearly all of them are taken for "
+                f"false; {likely}"
             )
         return None
 
@@ -245,8 +244,8 @@ class RunSteps:
             if len(scores) and np.quantile(scores, _MOSTLY) < state.even_score:
                 half = np.median(scores) / 2
                 return (
-                    f"most scores of {name!r} are below {state.even_score:.2g}, where a box is taken to be as likely "
-                    f"false as real; if its boxes are real, set sensors.{name}.even_score={half:.2g}"
+                    f"most scores of {name!r} are below {state.even_score:.2g}, where a box is as "
+                    f"likely false as real; if its boxes are real, set sensors.{name}.even_score={half:.2g}"
                 )
         return None
 

@@ -125,8 +125,8 @@ def texts(path: Path) -> Iterator[str]:
 @pytest.mark.parametrize("line", lines_of("Clocks that differ"))
 def test_a_line_on_clocks_is_one_of_the_program(line):
     live = ROOT / "jeat_graph" / "live"
-    files = (ROOT / "jeat_graph" / "runs" / "clock_comparison.py", live / "late.py", live / "clock_steps.py")
-    pieces = [piece.strip(" ()") for piece in re.split(r"…|\*", general(line))]
+    files = (ROOT / "jeat_graph" / "runs" / "clock_comparison.py", live / "late.py", *live.glob("clock_*.py"))
+    pieces = [piece.strip(" ()+") for piece in re.split(r"…|\*", general(line))]
     said = [text for path in files for text in texts(path)]
     assert [text for text in said if all(piece in text for piece in pieces)]
 
