@@ -14,34 +14,16 @@ from benchmarks.speed_worker import resident_mib
 from jeat_graph import Tracker, load_config
 from jeat_graph.smoothers.filtered_track import FilteredTrack
 from jeat_graph.smoothers.gtsam.solvers import LagChain
+from tests.tracking.endless import scans_100_hz
 
 #: The tracker whose smoother is GTSAM's with a fixed lag.
 LAGGED = load_config("paper", ["smoother.engine=gtsam"])
 
 
-def traffic(num):
-    """Scans at 100 Hz: three vehicles that start again every 3 s, clutter, and scans without detections."""
-    rng = np.random.default_rng(0)
-    size = np.array([40.0, 30.0])
-    clutter = np.hstack([rng.uniform([0, 0], [1200, 650], (997, 2)), rng.uniform(10, 60, (997, 2))])
-    noise = rng.normal(0, 1.0, (1009, 3, 2))
-    scores = np.full(4, 0.9)
-    for k in range(num):
-        t = 0.01 * k
-        age = t % 3.0
-        centre = np.array([[100 + 300 * age, 200], [1100 - 300 * age, 400], [300 + 100 * age, 600]])
-        boxes = np.empty((4, 4))
-        boxes[:3, :2] = centre + noise[k % 1009] - size / 2
-        boxes[:3, 2:] = size
-        boxes[3] = clutter[k % 997]
-        shown = 0 if k % 10 == 7 else 4 if k % 5 == 0 else 3
-        yield (t, "evt" if k % 6 else "rgb", boxes[:shown], scores[:shown])
-
-
 def live(preset):
     """Memory of a tracker that is stepped for minutes (MiB, one reading per 35 s)."""
     tracker, memory = Tracker(load_config(preset, ["smoother.engine=none"])), []
-    for k, scan in enumerate(traffic(17_500)):
+    for k, scan in enumerate(scans_100_hz(17_500)):
         tracker.step(scan)
         if k % 3_500 == 3_499:
             gc.collect()

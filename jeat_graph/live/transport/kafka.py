@@ -10,6 +10,7 @@ from confluent_kafka import Consumer, KafkaError, KafkaException, Producer, Topi
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.brokers.record import Sink, Source
 from jeat_graph.live.transport.notices import Notices
 from jeat_graph.live.transport.patience import SLICE_S, Overdue, UnconfirmedError, check, never
 
@@ -60,7 +61,7 @@ def _reach(client: Any, address: Address, notices: Notices) -> None:
     notices.found(address)
 
 
-class KafkaSource:
+class KafkaSource(Source):
     """Messages of a topic, as a member of a group (see `record.Source`); order holds within a partition.
 
     Members of one group share the topic's partitions; one for which none is left gets a notice.
@@ -165,7 +166,7 @@ class KafkaSource:
         self._consumer.close()
 
 
-class KafkaSink:
+class KafkaSink(Sink):
     """Produces to a topic, each message once and in order (see `record.Sink`).
 
     All messages have one key and so come to one partition: only within a partition does order hold.

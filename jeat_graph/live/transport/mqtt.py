@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.brokers.record import Sink, Source
 from jeat_graph.live.transport.brokers.registry import brokers
 from jeat_graph.live.transport.mqtt_link import PACKET_MOST, MqttLink
 from jeat_graph.live.transport.names import distinct_name
@@ -42,7 +43,7 @@ class _Message(NamedTuple):
     payload: bytes
 
 
-class MqttSource:
+class MqttSource(Source):
     """Subscription of a topic, wild cards allowed (see `record.Source`).
 
     The broker keeps the session of `client` (option; default from the topic) for a day, and with it what
@@ -159,7 +160,7 @@ class MqttSource:
         self._notices.tell()
 
 
-class MqttSink:
+class MqttSink(Sink):
     """Publishes to a topic; sent again after a lost connection (see `record.Sink`).
 
     Args:

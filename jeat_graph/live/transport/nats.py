@@ -16,6 +16,7 @@ from nats.js.errors import APIError, NoStreamResponseError, NotFoundError
 
 from jeat_graph.data.errors import JeatGraphError
 from jeat_graph.live.transport.address import Address
+from jeat_graph.live.transport.brokers.record import Sink, Source
 from jeat_graph.live.transport.names import distinct_name
 from jeat_graph.live.transport.nats_link import CALL_S, NatsLink, why
 from jeat_graph.live.transport.nats_presence import Presence
@@ -36,7 +37,7 @@ _BACK_OFF_S = (0.1, 10.0)
 _STREAM_TOO_LARGE, _ASKED_WRONGLY = 10054, range(400, 500)
 
 
-class NatsSource:
+class NatsSource(Source):
     """Messages of a subject from its JetStream stream, in the stream's order (see `record.Source`).
 
     The consumer is called `durable` (option; the default is made of stream and subject, so that streams of
@@ -178,7 +179,7 @@ class NatsSource:
         self._link.close()
 
 
-class NatsSink:
+class NatsSink(Sink):
     """Publishes to a subject that a JetStream stream keeps (see `record.Sink`).
 
     Args:

@@ -4,29 +4,15 @@ from __future__ import annotations
 
 import re
 
-from jeat_graph.live.transport.address import Address
-from jeat_graph.live.transport.brokers.record import Broker, Sink, Source
-from jeat_graph.live.transport.notices import Notices
-from jeat_graph.live.transport.patience import Overdue
+from jeat_graph.live.transport.brokers.record import Broker, opener_of
 
+_CLIENT = "jeat_graph.live.transport.kafka"
 _TOPIC = re.compile(r"[A-Za-z0-9._-]{1,249}")
 
 
 def _wrong_topic(topic: str) -> str:
     fits = _TOPIC.fullmatch(topic) and topic not in (".", "..")
     return "" if fits else "a topic of Kafka has letters, digits, '.', '_' and '-', 249 at most"
-
-
-def _source(address: Address, overdue: Overdue, notices: Notices) -> Source:
-    from jeat_graph.live.transport.kafka import KafkaSource
-
-    return KafkaSource(address, overdue, notices)
-
-
-def _sink(address: Address, overdue: Overdue, notices: Notices) -> Sink:
-    from jeat_graph.live.transport.kafka import KafkaSink
-
-    return KafkaSink(address, overdue, notices)
 
 
 BROKER = Broker(
@@ -36,10 +22,10 @@ BROKER = Broker(
     secure_port=9093,
     wrong_topic=_wrong_topic,
     covers=lambda wanted, topic: wanted == topic,
-    open_source=_source,
-    open_sink=_sink,
+    open_source=opener_of(_CLIENT, "KafkaSource"),
+    open_sink=opener_of(_CLIENT, "KafkaSink"),
     source_options=("group",),
     sink_options=("key", "most"),
-    client="jeat_graph.live.transport.kafka",
+    client=_CLIENT,
     extra="kafka",
 )

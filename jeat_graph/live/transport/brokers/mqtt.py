@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from jeat_graph.live.transport.address import Address
-from jeat_graph.live.transport.brokers.record import Broker, Sink, Source
+from jeat_graph.live.transport.brokers.record import Broker, opener_of
 from jeat_graph.live.transport.brokers.wild_cards import matches
-from jeat_graph.live.transport.notices import Notices
-from jeat_graph.live.transport.patience import Overdue
 
+_CLIENT = "jeat_graph.live.transport.mqtt"
 #: Longest topic (bytes), by the specification.
 _MOST = 65_535
 _SHARED = "$share/"
@@ -42,18 +40,6 @@ def _covers(wanted: str, topic: str) -> bool:
     return matches(words, topic.split("/"), "+", "#", rest_may_be_none=True)  # '#' stands for its parent too
 
 
-def _source(address: Address, overdue: Overdue, notices: Notices) -> Source:
-    from jeat_graph.live.transport.mqtt import MqttSource
-
-    return MqttSource(address, overdue, notices)
-
-
-def _sink(address: Address, overdue: Overdue, notices: Notices) -> Sink:
-    from jeat_graph.live.transport.mqtt import MqttSink
-
-    return MqttSink(address, overdue, notices)
-
-
 BROKER = Broker(
     scheme="mqtt",
     title="MQTT",
@@ -61,12 +47,12 @@ BROKER = Broker(
     secure_port=8883,
     wrong_topic=_wrong_topic,
     covers=_covers,
-    open_source=_source,
-    open_sink=_sink,
+    open_source=opener_of(_CLIENT, "MqttSource"),
+    open_sink=opener_of(_CLIENT, "MqttSink"),
     has_wild_cards=lambda topic: bool(set(topic) & {"#", "+"}),
     source_options=("client", "most"),
     sink_options=("client", "most", "largest"),
     secure_aliases=("mqtts",),
-    client="jeat_graph.live.transport.mqtt",
+    client=_CLIENT,
     extra="mqtt",
 )

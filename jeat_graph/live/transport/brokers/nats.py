@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import re
 
-from jeat_graph.live.transport.address import Address
-from jeat_graph.live.transport.brokers.record import Broker, Sink, Source
+from jeat_graph.live.transport.brokers.record import Broker, opener_of
 from jeat_graph.live.transport.brokers.wild_cards import matches
-from jeat_graph.live.transport.notices import Notices
-from jeat_graph.live.transport.patience import Overdue
 
+_CLIENT = "jeat_graph.live.transport.nats"
 _NAME = re.compile(r"[^\s.*>/\\]{1,255}")
 
 
@@ -24,18 +22,6 @@ def _covers(wanted: str, topic: str) -> bool:
     return matches(wanted.split("."), topic.split("."), "*", ">", rest_may_be_none=False)
 
 
-def _source(address: Address, overdue: Overdue, notices: Notices) -> Source:
-    from jeat_graph.live.transport.nats import NatsSource
-
-    return NatsSource(address, overdue, notices)
-
-
-def _sink(address: Address, overdue: Overdue, notices: Notices) -> Sink:
-    from jeat_graph.live.transport.nats import NatsSink
-
-    return NatsSink(address, overdue, notices)
-
-
 BROKER = Broker(
     scheme="nats",
     title="NATS",
@@ -43,13 +29,13 @@ BROKER = Broker(
     secure_port=4222,
     wrong_topic=_wrong_topic,
     covers=_covers,
-    open_source=_source,
-    open_sink=_sink,
+    open_source=opener_of(_CLIENT, "NatsSource"),
+    open_sink=opener_of(_CLIENT, "NatsSink"),
     has_wild_cards=lambda topic: bool({"*", ">"} & set(topic.split("."))),
     allows_name=lambda name: name.isprintable() and bool(_NAME.fullmatch(name)),
     source_options=("stream", "durable", "most"),
     sink_options=("stream", "most"),
     greets_first=True,
-    client="jeat_graph.live.transport.nats",
+    client=_CLIENT,
     extra="nats",
 )

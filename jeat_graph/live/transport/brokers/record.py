@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from jeat_graph.live.transport.address import Address
@@ -82,6 +83,16 @@ class Sink(Protocol):
 def any_name(name: str) -> bool:
     """Tell that a printable name is allowed."""
     return bool(name) and name.isprintable()
+
+
+def opener_of(client: str, name: str) -> Callable[[Address, Overdue, Notices], Any]:
+    """Return what opens an end of a broker whose client's package need not be installed.
+
+    Args:
+        client: module that needs the package; it is imported when the first end is opened.
+        name: its class, a `Source` or a `Sink`.
+    """
+    return lambda *given: getattr(import_module(client), name)(*given)
 
 
 @dataclass(frozen=True)
