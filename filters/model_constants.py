@@ -58,6 +58,9 @@ class ModelConstants:
         lasting_within_s: and no further apart than this.
         lasting_clip: largest difference that counts (sizes, or ln size).
         lasting_count: pairs of differences that the prior of no such error counts for.
+        aspect_pairs: pairs of differences over which an object's aspect is one measurement.
+        aspect_prior: standard deviation of (V_s − V_o)/(V_s + V_o) about what P_D says of it.
+        aspect_clip: largest sum of two boxes' ln(w/h) that counts.
         lasting_boxes: boxes in the filter's memory, over which such an error is not averaged out.
         compared_std: least standard deviation of a side of a sensor that others are compared with (sizes): of
             the common frame.
@@ -189,6 +192,9 @@ class ModelConstants:
     lasting_within_s: float = 5.0
     lasting_clip: float = 0.3
     lasting_count: float = 20.0
+    aspect_pairs: float = 4.0
+    aspect_prior: float = 0.5
+    aspect_clip: float = 5.0
     lasting_boxes: float = 4.0
     compared_std: float = 0.1
 

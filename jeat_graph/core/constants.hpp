@@ -140,6 +140,9 @@ inline constexpr double kLongestAgoS = 1000000000.0;
     JEAT_ONE(lasting_within_s) \
     JEAT_ONE(lasting_clip) \
     JEAT_ONE(lasting_count) \
+    JEAT_ONE(aspect_pairs) \
+    JEAT_ONE(aspect_prior) \
+    JEAT_ONE(aspect_clip) \
     JEAT_ONE(lasting_boxes) \
     JEAT_ONE(compared_std) \
     JEAT_ONE(gate) \

@@ -24,7 +24,7 @@ from jeat_graph.tracking.first_sight import wider
 from jeat_graph.version import __version__
 
 #: Raised with every change of what is saved: a file of another format is refused, not guessed at.
-FORMAT = 44
+FORMAT = 45
 _MAGIC, _WHAT = "jeat-graph tracker", "saved tracker"
 
 

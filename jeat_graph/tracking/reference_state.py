@@ -49,7 +49,8 @@ class ReferenceTracks(ArrayTable):
         last_box: (N, S, 4) the last box of each sensor (left, top, right, bottom in px), as it was given; 0
             before the first.
         last_box_s: (N, S) its time (s).
-        apart: (N, S, S, 4) what a sensor's box differed by from another's, less their mean difference,
+        apart: (N, S, S, 5) what a sensor's box differed by from another's, less their mean difference, and
+            the sum of both aspects,
         apart_s: (N, S, S) its time (s),
         has_apart: (N, S, S) and whether there was one.
         innovation: (N, 4) the last normalised innovation of centre and ln size.
@@ -105,7 +106,7 @@ class ReferenceTracks(ArrayTable):
             recent_misses=np.zeros((number, sensors)),
             last_box=np.zeros((number, sensors, SIDES)),
             last_box_s=np.zeros((number, sensors)),
-            apart=np.zeros((number, sensors, sensors, SIDES)),
+            apart=np.zeros((number, sensors, sensors, SIDES + 1)),
             apart_s=np.zeros((number, sensors, sensors)),
             has_apart=np.zeros((number, sensors, sensors), dtype=np.bool_),
             innovation=np.zeros((number, SIDES)),

@@ -220,6 +220,7 @@ FORGED = {
     "belief.prior_odds": [1e5],
     "offsets.weight": [-1.0],
     "accuracy.pairs": [-1.0],
+    "accuracy.aspect": [np.inf],
     "accuracy.lasting": [-1.0, np.inf],
     "belief.score_weight": [-1.0, np.inf],
     "belief.stationary_prior": [-0.1, 1.5],

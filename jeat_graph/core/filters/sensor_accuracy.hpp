@@ -15,8 +15,14 @@
 
 namespace jeat::filters {
 
+inline constexpr std::size_t kSaid = 5;  // differences of two sensors (4), and the sum of both aspects
+// Sums over both times of a pair of u, u², e, e²; of e e', and of (e u' + e' u) / 2.
+enum AspectSum : std::size_t { kSum, kSumSquare, kDifference, kDifferenceSquare, kLasting, kLeaning, kAspectSums };
+using Said = std::array<double, kSaid>;
+
 struct AccuracySums {
     std::vector<double> pairs, product;  // (S, S)
+    std::vector<double> aspect;          // (S, S, kAspectSums), row less column
     std::vector<double> lasting;         // (S,)
 
     std::size_t sensors() const { return lasting.size(); }
@@ -25,15 +31,31 @@ struct AccuracySums {
         const std::size_t S = sensors();
         widen_pairs(pairs, 1, S, 1);
         widen_pairs(product, 1, S, 1);
+        widen_pairs(aspect, 1, S, kAspectSums);
         lasting.push_back(believed);
     }
 
-    void count(std::size_t i, std::size_t j, double of_pair) {
+    // A pair of what two sensors said of a track, and had said of it before.
+    void count(std::size_t i, std::size_t j, const Said& now, const double* before) {
         const std::size_t S = sensors(), at = i * S + j, back = j * S + i;
-        pairs[at] += 1.0;
-        pairs[back] += 1.0;
-        product[at] += of_pair;
-        product[back] += of_pair;
+        double of_pair = 0.0;
+        for (std::size_t k = 0; k < 4; ++k) of_pair += now[k] * before[k] * kToSides[k];
+        const double u = now[4], before_u = before[4], e = now[2] - now[3], before_e = before[2] - before[3];
+        double new_sums[kAspectSums];
+        new_sums[kSum] = u + before_u;
+        new_sums[kSumSquare] = u * u + before_u * before_u;
+        new_sums[kDifference] = e + before_e;
+        new_sums[kDifferenceSquare] = e * e + before_e * before_e;
+        new_sums[kLasting] = e * before_e;
+        new_sums[kLeaning] = (e * before_u + before_e * u) / 2.0;
+        for (const std::size_t one : {at, back}) {
+            pairs[one] += 1.0;
+            product[one] += of_pair;
+            for (std::size_t k = 0; k < kAspectSums; ++k) {
+                const bool turns = one == back && (k == kDifference || k == kLeaning);
+                aspect[one * kAspectSums + k] += turns ? -new_sums[k] : new_sums[k];
+            }
+        }
     }
 
     // `given` is what the user says of each, NaN where it is to be learnt.
@@ -70,7 +92,7 @@ struct AccuracySums {
                 const double held = c.error_share * (exp_of(log_side_variance[i]) + exp_of(log_side_variance[j]));
                 const double beyond = std::max(both[i * S + j] - held, 0.0),
                              rest = std::max(both[i * S + j] - known[j], 0.0);
-                sum += pairs[i * S + j] * (std::isnan(given[j]) ? beyond * share(p_detect[i], p_detect[j]) : rest);
+                sum += pairs[i * S + j] * (std::isnan(given[j]) ? beyond * share(i, j, p_detect, c) : rest);
                 number += pairs[i * S + j];
             }
             if (number > 0.0) lasting[i] = sum / number;
@@ -80,7 +102,24 @@ struct AccuracySums {
     }
 
 private:
-    static double share(double p, double other) { return (1.0 - p) / std::max(2.0 - p - other, kLeastShare); }
+    // Which share of what lasts between two sensors is the first one's.
+    double share(std::size_t i, std::size_t j, const std::vector<double>& p_detect, const ModelConstants& c) const {
+        const std::size_t at = i * sensors() + j;
+        const double* const sums = aspect.data() + at * kAspectSums;
+        const double number = std::max(pairs[at], 1.0);
+        const double u = sums[kSum] / number / 2.0, e = sums[kDifference] / number / 2.0;
+        const double var_u = sums[kSumSquare] / number / 2.0 - square(u);
+        const double var_e = sums[kDifferenceSquare] / number / 2.0 - square(e);
+        const double apart = std::max(sums[kLasting] / number - square(e), 0.0);
+        const double leaning = sums[kLeaning] / number - e * u;
+        const double missed = 1.0 - p_detect[i], other = 1.0 - p_detect[j];
+        const double prior = (missed - other) / std::max(missed + other, kLeastShare);
+        const double per_square = pairs[at] / c.aspect_pairs / std::max(var_u * var_e, kLeastShare);
+        const double precise = 1.0 / square(c.aspect_prior);
+        const double delta =
+            (prior * precise + per_square * apart * leaning) / (precise + per_square * square(apart));
+        return 0.5 + 0.5 * clamp(delta, -1.0, 1.0);
+    }
 
     // Which sensors were compared enough with two others that were compared with each other.
     std::vector<std::uint8_t> in_triangles(const ModelConstants& c) const {
@@ -102,10 +141,11 @@ inline std::array<double, 4> clipped(const std::array<double, 4>& d, const std::
     return out;
 }
 
-inline double product_of(const std::array<double, 4>& d, const double* before) {
-    double out = 0.0;
-    for (std::size_t k = 0; k < 4; ++k) out += d[k] * before[k] * kToSides[k];
-    return out;
+// The sum of ln(w/h) of both sensors' boxes.
+inline double aspect_sum(const Sides& box, const Sides& other, const ModelConstants& c) {
+    const double one = log_of((box.right - box.left) / (box.bottom - box.top));
+    const double two = log_of((other.right - other.left) / (other.bottom - other.top));
+    return clamp(one + two, -c.aspect_clip, c.aspect_clip);
 }
 
 // Variance of one side as the filter takes it: of how many pairs of boxes a sensor was compared by, and its V.

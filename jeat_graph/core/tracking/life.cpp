@@ -45,16 +45,16 @@ private:
     ByLeft tracks_, boxes_;
 };
 
-// Count what lasts of the differences d of two sensors on a track; keep d where the last is old.
-void compare_errors(State& state, std::size_t row, std::size_t k, std::size_t other, const std::array<double, 4>& d) {
+// Count what lasts of what two sensors say of a track; keep it where the last is old.
+void compare_errors(State& state, std::size_t row, std::size_t k, std::size_t other, const Said& said) {
     Tracks& tracks = state.tracks;
     const ModelConstants& c = state.constants;
     const std::size_t S = state.sensors.size(), at = (row * S + k) * S + other;
     const double age = tracks.has_apart[at] ? state.t - tracks.apart_s[at] : std::numeric_limits<double>::infinity();
     if (age < c.lasting_after_s) return;
-    double* const before = tracks.apart.data() + at * 4;
-    if (age <= c.lasting_within_s) state.accuracy.count(k, other, product_of(d, before));
-    std::copy(d.begin(), d.end(), before);
+    double* const before = tracks.apart.data() + at * kSaid;
+    if (age <= c.lasting_within_s) state.accuracy.count(k, other, said, before);
+    std::copy(said.begin(), said.end(), before);
     tracks.apart_s[at] = state.t;
     tracks.has_apart[at] = 1;
 }
@@ -133,7 +133,8 @@ void compare_sensors(State& state, const Scan& given, const AssociatedPairs& pai
             const double* const m = tracks.mean_of(i);
             const auto d = difference(given.boxes[j], before, m[kVelocity] * age, m[kStates + kVelocity] * age);
             state.offsets.count(k, other, d, expected, c);
-            compare_errors(state, i, k, other, clipped(d, expected, c));
+            const auto [x, y, width, height] = clipped(d, expected, c);
+            compare_errors(state, i, k, other, {x, y, width, height, aspect_sum(given.boxes[j], before, c)});
         }
     }
     for (std::size_t j = 0; j < given.boxes.size(); ++j) {

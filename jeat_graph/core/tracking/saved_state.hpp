@@ -114,9 +114,10 @@ template <class Visitor> void visit_state(Visitor& v, State& state) {
     (void)offset_sensors;
     v.column("offsets.weight", weight, S * S, 1);
     v.column("offsets.total", total, S * S, 4);
-    auto& [pairs, product, lasting] = accuracy;
+    auto& [pairs, product, aspect, lasting] = accuracy;
     v.column("accuracy.pairs", pairs, S * S, 1);
     v.column("accuracy.product", product, S * S, 1);
+    v.column("accuracy.aspect", aspect, S * S, kAspectSums);
     v.column("accuracy.lasting", lasting, S, 1);
     v.column("log_side_variance", log_side_variance, S, 1);
     v.numbers("learnt_s", &learnt_s, 1, Values::any);

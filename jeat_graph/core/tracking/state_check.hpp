@@ -108,6 +108,13 @@ inline void check_accuracy(const AccuracySums& sums) {
                     "is not the same both ways");
             require(std::abs(sums.product[at]) <= kMostLogSize * (sums.pairs[at] + 1.0), "accuracy.product",
                     "is of no boxes");
+            for (std::size_t k = 0; k < kAspectSums; ++k) {
+                const double one = sums.aspect[at * kAspectSums + k], other = sums.aspect[back * kAspectSums + k];
+                const bool turns = k == kDifference || k == kLeaning;
+                require(one == (turns ? -other : other), "accuracy.aspect", "is not the same both ways");
+                require(std::abs(one) <= square(kMostLogSize) * (sums.pairs[at] + 1.0), "accuracy.aspect",
+                        "is of no boxes");
+            }
         }
 }
 
