@@ -17,7 +17,7 @@ from jeat_graph.detection.models.feeding import letterbox_scale
 from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Picture
 from jeat_graph_sehn.training.event_samples import LongSequence, Sequence, draw_stream
-from jeat_graph_sehn.training.fused_network import TOLD, SeenPictures
+from jeat_graph_sehn.training.fused_network import AVAILABILITY, SeenPictures
 from jeat_graph_sehn.training.fused_samples import FusedSequence, draw_fused
 from jeat_graph_sehn.training.learning import Target
 from jeat_graph_sehn.training.picture_samples import cut_out, draw_light, draw_window
@@ -224,7 +224,7 @@ def _joined(drawn: AnySequence[FusedSequence], net: NetSettings) -> ShownBatch:
     seen = SeenPictures(
         torch.from_numpy(np.concatenate([one.pictures for one in drawn])),
         torch.from_numpy(which.reshape(-1)),
-        torch.from_numpy(np.stack([one.given for one in drawn], axis=1).reshape(-1, TOLD)),
+        torch.from_numpy(np.stack([one.given for one in drawn], axis=1).reshape(-1, AVAILABILITY)),
     )
     targets = [list(of_step) for of_step in zip(*(_targets(one.events) for one in drawn), strict=True)]
     passed = _elapsed([one.events for one in drawn], net)

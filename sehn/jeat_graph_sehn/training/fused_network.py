@@ -27,10 +27,10 @@ from jeat_graph_sehn.training.network import (
 )
 from jeat_graph_sehn.training.settings import COLOURS, STRIDES, NetSettings
 
-#: Name of the input that says what there is: `TOLD` numbers.
+#: Name of the input that says what there is: `AVAILABILITY` numbers.
 GIVEN_INPUT = "given"
 #: Whether there is a picture (1 or 0), its age (s), whether there are events (1 or 0).
-TOLD = 3
+AVAILABILITY = 3
 #: The age is given in units of this (s), and above the most of them all ages are the same.
 _AGE_S, _MOST_AGES = 0.1, 5.0
 
@@ -70,16 +70,17 @@ class GatedSum(nn.Module):
         super().__init__()
         self.carry = nn.Conv2d(channels, channels, 1)
         self.gate = nn.Conv2d(2 * channels, 2 * channels, 1)
-        self.told = nn.Linear(TOLD, 2 * channels, bias=False)
+        self.availability = nn.Linear(AVAILABILITY, 2 * channels, bias=False)
         # At first everything counts equally.
         silence(self.gate)
-        nn.init.zeros_(self.told.weight)
+        nn.init.zeros_(self.availability.weight)
 
-    def forward(self, picture: Tensor, events: Tensor, told: Tensor) -> Tensor:
-        """Return the sum (B, C, H, W) of features of that shape; told: (B, 3)."""
-        picture = picture * told[:, 0, None, None, None]
-        events = self.carry(events) * told[:, 2, None, None, None]
-        gates = self.gate(torch.cat([picture, events], dim=1)) + self.told(told)[:, :, None, None]
+    def forward(self, picture: Tensor, events: Tensor, available: Tensor) -> Tensor:
+        """Return the sum (B, C, H, W) of features of that shape; available: (B, 3)."""
+        picture = picture * available[:, 0, None, None, None]
+        events = self.carry(events) * available[:, 2, None, None, None]
+        offsets = self.availability(available)[:, :, None, None]
+        gates = self.gate(torch.cat([picture, events], dim=1)) + offsets
         of_picture, of_events = (2.0 * torch.sigmoid(gates)).chunk(2, dim=1)
         return of_picture * picture + of_events * events
 
@@ -150,9 +151,9 @@ class FusedNet(VehicleNet):
         of_events, kept = self.events(x, state[:count], length, elapsed_s)
         of_pictures, _ = self.pictures(seen.pictures)
         age = torch.clamp(seen.given[:, 1:2] / _AGE_S, max=_MOST_AGES)
-        told = torch.cat([seen.given[:, :1], age, seen.given[:, 2:]], dim=1)
+        available = torch.cat([seen.given[:, :1], age, seen.given[:, 2:]], dim=1)
         levels = [
-            join(picture[seen.which] if len(seen.which) else picture, events, told)
+            join(picture[seen.which] if len(seen.which) else picture, events, available)
             for join, picture, events in zip(self.join, of_pictures, of_events, strict=True)
         ]
         for k, (recall, before) in enumerate(zip(self.recall, state[count:], strict=True)):
@@ -166,7 +167,7 @@ class FusedNet(VehicleNet):
         return {
             EVENTS_INPUT: torch.zeros(1, self.settings.channels, side[1], side[0]),
             PICTURE_INPUT: torch.zeros(1, COLOURS, side[1], side[0]),
-            GIVEN_INPUT: torch.zeros(1, TOLD),
+            GIVEN_INPUT: torch.zeros(1, AVAILABILITY),
             **elapsed_input(self.settings),
         }
 

@@ -12,7 +12,7 @@ from jeat_graph.detection.models.event_places import event_scale
 from jeat_graph.io.media.decoders import RgbImage
 from jeat_graph_sehn.training.data_sets import FusedSegment
 from jeat_graph_sehn.training.event_samples import Sequence, cut_sequence, drawn_events
-from jeat_graph_sehn.training.fused_network import TOLD
+from jeat_graph_sehn.training.fused_network import AVAILABILITY
 from jeat_graph_sehn.training.picture_samples import cut_out, draw_light, draw_window
 from jeat_graph_sehn.training.settings import COLOURS, FusedChanges, NetSettings, TrainSettings
 
@@ -84,7 +84,7 @@ def draw_fused(
     light = draw_light(rng, changes)
     width, height = settings.crop_px
     pictures = [cut_out(picture(one), window, rng, light) for one in kept]
-    given = np.zeros((len(ends), TOLD), dtype=np.float32)
+    given = np.zeros((len(ends), AVAILABILITY), dtype=np.float32)
     which = np.zeros(len(ends), dtype=np.int64)
     for k, (one, t) in enumerate(zip(seen, now, strict=True)):
         age_s = 0.0 if one is None else max(plan.rate * (t - segment.times_s[one]), 0.0)

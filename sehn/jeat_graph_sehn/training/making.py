@@ -135,7 +135,7 @@ def read_network(path: Path) -> VehicleNet:
             norm.running_var.fill_(1.0 - norm.eps)
             if layer.bias is not None:
                 norm.bias.copy_(layer.bias)
-        _read_told(path, net)
+        _read_availability(path, net)
         _read_lasting(path, net)
     return net
 
@@ -228,7 +228,7 @@ def _layers(path: Path) -> Iterator[_Layer]:
             yield _Layer(weight, bias)
 
 
-def _read_told(path: Path, net: VehicleNet) -> None:
+def _read_availability(path: Path, net: VehicleNet) -> None:
     """Read the layers of a network of both sensors that are no convolutions."""
     if not isinstance(net, FusedNet):
         return
@@ -237,7 +237,8 @@ def _read_told(path: Path, net: VehicleNet) -> None:
     for join, node in zip(net.join, products[: len(net.join)], strict=True):
         assert isinstance(join, GatedSum)
         weight = values[node.input[1]]
-        join.told.weight.copy_(weight.reshape(join.told.weight.shape) if node.op_type == "Gemm" else weight.T)
+        own = join.availability.weight
+        own.copy_(weight.reshape(own.shape) if node.op_type == "Gemm" else weight.T)
 
 
 def lasting_of(net: VehicleNet) -> list[list[float]]:
