@@ -9,7 +9,7 @@
 #   make licences   list the licences of everything installed with the package
 #   make fuzz    the long form of the tests that damage files, streams and processes (an hour)
 #   make live    the long form of the tests of live use: kills, brokers, late data (half an hour)
-#   make lint    style, format, docstrings, and known weaknesses of what is installed
+#   make lint    style, format, docstrings, faults of C++, and known weaknesses of what is installed
 #   make types   type-check the built packages and the benchmarks
 #   make bounds  run the numerical tests with the oldest versions allowed of what is needed
 #   make core    build what is compiled, after a change of it
@@ -94,6 +94,7 @@ lint: $(VENV)/.lint $(VENV)/.core $(VENV)/.sehn
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@$(BIN)/clang-format --dry-run --Werror $(CPP)
+	@$(BIN)/python .ci/tidy.py
 	@$(BIN)/interrogate --quiet $(DOCUMENTED) || $(BIN)/interrogate -v $(DOCUMENTED)
 	@$(BIN)/python .ci/prose.py
 	@$(BIN)/python .ci/audit.py

@@ -2,8 +2,9 @@
 
 `python .ci/mutants.py [--number 150] [--seed 0] [FOLDER ...]` draws places in the code, changes one at a time
 (an operator, a comparison, a number, a condition) and runs the tests of the folder's twin until the first
-failure. Survivors are listed with what was changed. Some changes mean the same (`max` for `min` of one
-value), so the score of good tests is below 100 %. Constants of a module are left out: benchmarks judge them.
+failure; tests that do not end have found it too. Survivors are listed with what was changed; some changes
+mean the same (`max` for `min` of one value), so the score of good tests is below 100 %. Constants of a module
+are left out: benchmarks judge them.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import copy
 import importlib.machinery
 import os
 import random
+import resource
 import signal
 import sys
 import time
@@ -30,8 +32,8 @@ TWINS = {
     "smoothers": "tests/smoothers",
     "jeat_graph/tracking": "tests/tracking",
 }
-#: Tests of a mutant that take longer (s) have found it: it does not end.
-_LONGEST_S = 300.0
+#: Tests of a mutant do not end that take more time of the processor (s), or so many times that of a clock.
+_LONGEST_S, _WAITED = 900, 10
 _OPERATORS: dict[type, type] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
@@ -143,27 +145,29 @@ def drawn(folders: list[str], count: int, seed: int) -> list[Mutant]:
     return [Mutant(p, k, *mutated(p.read_text(encoding="utf-8"), k)[1:]) for p, k in chosen]
 
 
-def survives(mutant: Mutant, tests: str) -> bool:
-    """Run the tests in a process of their own, in which the file is the mutant's."""
+def fate(mutant: Mutant, tests: str) -> str:
+    """Run the tests in a process of their own, in which the file is the mutant's, and say what came of it."""
     child = os.fork()
     if child == 0:
         os.setpgid(0, 0)
         os._exit(_tested(mutant, tests))
-    end = time.monotonic() + _LONGEST_S
+    end = time.monotonic() + _WAITED * _LONGEST_S
     while time.monotonic() < end:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
-            return os.waitstatus_to_exitcode(status) == 0
+            code = os.waitstatus_to_exitcode(status)
+            return "SURVIVED" if code == 0 else "endless" if code == -signal.SIGXCPU else "found"
         time.sleep(0.05)
     with contextlib.suppress(ProcessLookupError):
         os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    return False
+    return "endless"
 
 
 def _tested(mutant: Mutant, tests: str) -> int:
     import pytest
 
+    resource.setrlimit(resource.RLIMIT_CPU, (_LONGEST_S, _LONGEST_S + 10))
     tree = mutated(mutant.path.read_text(encoding="utf-8"), mutant.number)[0]
     code = compile(ast.fix_missing_locations(tree), str(mutant.path), "exec")
     usual = importlib.machinery.SourceFileLoader.get_code
@@ -201,10 +205,9 @@ def main() -> int:
     for n, mutant in enumerate(mutants, 1):
         name = mutant.path.relative_to(ROOT).as_posix()
         tests = next(twin for folder, twin in TWINS.items() if name.startswith(folder + "/"))
-        alive = survives(mutant, tests)
-        found += not alive
-        fate = "SURVIVED" if alive else "found"
-        print(f"{fate:8} {name}:{mutant.line}: {mutant.before}  ->  {mutant.after}", flush=True)
+        known = fate(mutant, tests)
+        found += known != "SURVIVED"
+        print(f"{known:8} {name}:{mutant.line}: {mutant.before}  ->  {mutant.after}", flush=True)
         print(f"         {found} of {n}", flush=True)
     print(f"mutants: {found} of {len(mutants)} found")
     return 0

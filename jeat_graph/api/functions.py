@@ -79,10 +79,15 @@ def track(
 def _with_declared(config: Config | PathLike, recording: object) -> Config | PathLike:
     """Return the configuration `default` with what a table says of its detectors; another as it is."""
     from jeat_graph.config.reading import load_config
-    from jeat_graph.io.tables.sensor_columns import as_settings, declared_by, declared_by_frame
-    from jeat_graph.runs.track_files import DECLARING_CONFIG
+    from jeat_graph.io.tables.sensor_columns import (
+        DECLARING_CONFIG,
+        as_settings,
+        declared_by,
+        declared_by_frame,
+        takes_declared,
+    )
 
-    if config != DECLARING_CONFIG or isinstance(recording, Detections):
+    if not takes_declared(config) or isinstance(recording, Detections):
         return config
     declared = declared_by(recording) if isinstance(recording, (str, Path)) else declared_by_frame(recording)
     return load_config(DECLARING_CONFIG, as_settings(declared))

@@ -136,7 +136,7 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     """Track a recording and judge the tracks, and draw them."""
     from jeat_graph.config.reading import as_config, load_config
     from jeat_graph.io.tables.detections_io import write_detections
-    from jeat_graph.io.tables.sensor_columns import as_settings
+    from jeat_graph.io.tables.sensor_columns import as_settings, takes_declared
     from jeat_graph.io.tables.trajectories_io import read_trajectories
     from jeat_graph.io.tables.truth_io import write_truth
     from jeat_graph.runs.declaring import fit_input
@@ -144,12 +144,11 @@ def _show(args: argparse.Namespace, out: Path) -> None:
     from jeat_graph.runs.input_checks import check_detections
     from jeat_graph.runs.inputs import describe_inputs
     from jeat_graph.runs.run_options import RunOptions, RunRecord
-    from jeat_graph.runs.track_files import DECLARING_CONFIG
     from jeat_graph.runs.tracking_run import write_run
 
     load_config(args.config)  # what is wrong in it is reported before anything is simulated
     recording = _recording(args)
-    declared = as_settings(recording.declared) if args.config == DECLARING_CONFIG else []
+    declared = as_settings(recording.declared) if takes_declared(args.config) else []
     config = load_config(args.config, declared)
     config = as_config(config, (recording.width, recording.height))
     config = fit_input(config, recording.detections)[0]

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from jeat_graph.config.schema import Config
     from jeat_graph.io.tables.sensor_columns import Declared
 
-#: The configuration that takes what tables say of their detectors.
-DECLARING_CONFIG = "default"
-
 
 @dataclass(frozen=True)
 class TrackRequest:
@@ -95,15 +92,15 @@ class TrackRequest:
     def declared(self) -> Declared:
         """Return what the detections' own tables say of their detectors (`sensor_columns`).
 
-        Another configuration than `default`, a preset or the user's own, says itself what its sensors are.
+        Nothing where the configuration is not one that takes it.
 
         Raises:
             DataError: a table cannot be read, or says two things of one sensor.
         """
         from jeat_graph.io.tables.detections_io import split_name
-        from jeat_graph.io.tables.sensor_columns import declared_by_all
+        from jeat_graph.io.tables.sensor_columns import declared_by_all, takes_declared
 
-        return declared_by_all(map(split_name, self.detections)) if self.config == DECLARING_CONFIG else {}
+        return declared_by_all(map(split_name, self.detections)) if takes_declared(self.config) else {}
 
     def configured(self) -> tuple[Config, list[str]]:
         """Load the configuration, with what the detections say, and what files beside them say.

@@ -163,6 +163,16 @@ def test_the_evidence_that_scores_have_a_meaning_is_that_by_integration(things, 
     assert score_calibration.log_factor(sums, C) == pytest.approx(want, rel=1e-6)
 
 
+@pytest.mark.parametrize(("scans", "persistent"), [(20, 0.0), (60, 0.0), (20, 0.1), (300, 0.0)])
+def test_the_probability_that_scores_have_a_meaning_is_that_of_bayes(scans, persistent):
+    counts = _repeated(persistent, 12, scans, std=3.0)  # so that they vary by more than is asked for
+    likelihood = np.array([1.0, np.exp(score_calibration.log_factor(counts.persistence, C))])
+    prior = np.array([C.no_meaning_share, 1.0 - C.no_meaning_share])
+    none, some = prior * likelihood / (prior @ likelihood)
+    assert none > 1e-3
+    assert score_calibration.meaning(counts, C) == pytest.approx(some)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_box_that_overlaps_a_better_one_is_less_likely_an_object(seed):
     rng = np.random.default_rng(seed)

@@ -15,10 +15,10 @@ template <bool swapped> struct Halves {
     static std::uint32_t columns(std::uint64_t word) { return static_cast<std::uint32_t>(swapped ? word >> 32 : word); }
 };
 
-// Counts the events of a word, bits of which the first `most` lie in the picture, as `hold` does.
+// Counts the events of a word that is late, bits of which the first `most` lie in the picture, as `hold` does.
 inline void hold_columns(std::uint32_t columns, std::int64_t most, std::int64_t t, std::int64_t last,
                          DecoderState& state) {
-    if (most <= 0) return;
+    if (most <= 0 || t >= last) return;
     const std::uint32_t inside = most >= 32 ? columns : columns & ((std::uint32_t{1} << most) - 1);
     if (inside != 0) hold(std::popcount(inside), t, last, state);
 }
@@ -43,10 +43,10 @@ template <bool swapped> std::size_t decode(std::span<const std::uint64_t> words,
             const std::int64_t x = (word >> 11) & SIDE, y = word & SIDE;
             if (time >= 0 && columns != 0 && y < limits.height) {
                 const std::int64_t t = time + evt2::lower_time(word);
-                if (t < previous) ++state.backwards;
+                state.backwards += t < previous;
                 previous = t;
                 last = std::max(t, last);
-                if (t < last) hold_columns(columns, limits.width - x, t, last, state);
+                hold_columns(columns, limits.width - x, t, last, state);
             }
             for (; columns != 0; columns &= columns - 1) {
                 const std::int64_t column = x + std::countr_zero(columns);

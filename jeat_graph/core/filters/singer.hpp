@@ -61,7 +61,8 @@ template <int N> std::array<double, N * N> short_exponential(const std::array<do
 // How often a step is halved until the series converges.
 inline int halvings(double dt, double fastest) {
     int n = 0;
-    for (double h = dt * fastest; h > 0.1; h /= 2.0) ++n;
+    double h = dt * fastest;
+    while (h > 0.1) h /= 2.0, ++n;
     return n;
 }
 

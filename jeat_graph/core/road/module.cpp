@@ -60,6 +60,7 @@ Filter filter_of(const Camera& camera, const nb::object& config, In1D size, In2D
                  In2D errors) {
     check(errors.shape(1) == 2, "two errors for each sensor");
     std::vector<SensorErrors> of_sensors;
+    of_sensors.reserve(errors.shape(0));
     for (std::size_t s = 0; s < errors.shape(0); ++s)
         of_sensors.push_back({errors.data()[2 * s], errors.data()[2 * s + 1]});
     return Filter(camera, belief_of(config, size, size_cov, extremes), std::move(of_sensors));

@@ -79,7 +79,7 @@ void Associator::weigh_boxes(const CorrectedBoxes& scan, const Scan& given, cons
     for (std::size_t j = 0; j < scan.size(); ++j) {
         may_be_interrupted();
         double overlap = 0.0;
-        scan.index->near(scan.boxes[j], [&](std::size_t other, const Sides& box) {
+        scan.index.near(scan.boxes[j], [&](std::size_t other, const Sides& box) {
             if (given.logits[other] > given.logits[j])
                 overlap = std::max(overlap, intersection_over_union(scan.boxes[j], box));
         });
@@ -134,7 +134,7 @@ void Associator::find_candidates(const State& state, const CorrectedBoxes& scan,
             const double gain = log_ratio(track, scan, j, terms, c);
             if (gain > 0.0) candidates_.push_back({i, j, gain});
         };
-        scan.index->with_left_in(expected.box.left - reach, expected.box.left + reach, weigh);
+        scan.index.with_left_in(expected.box.left - reach, expected.box.left + reach, weigh);
     }
 }
 

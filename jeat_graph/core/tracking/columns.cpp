@@ -83,6 +83,7 @@ Named learnt_of(const State& state) {
     out["prior_odds"] = array_of(state.belief.prior_odds);
     const auto of_sensors = [&](double Sensor::* member) {
         std::vector<double> values;
+        values.reserve(state.sensors.size());
         for (const Sensor& sensor : state.sensors) values.push_back(sensor.*member);
         return array_of(values);
     };
@@ -97,6 +98,7 @@ Named learnt_of(const State& state) {
     out["log_side_variance"] = array_of(noise);
     out["lasting"] = array_of(state.accuracy.lasting);
     std::vector<double> gains;
+    gains.reserve(state.sensors.size());
     for (std::size_t k = 0; k < state.sensors.size(); ++k) gains.push_back(state.spread_noise(k).gain);
     out["log_own_variance"] = array_of(state.log_side_variance);
     out["spread_gain"] = array_of(gains);

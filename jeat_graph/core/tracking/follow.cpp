@@ -48,7 +48,7 @@ void CameraFollower::follow_picture(State& state, std::size_t sensor, const Corr
         moved_[k].x += change.rate[0] * change.elapsed;
         moved_[k].y += change.rate[1] * change.elapsed;
     }
-    if (contradicted(tracks_, moved_, scan.boxes, *scan.index, state.camera)) return;
+    if (contradicted(tracks_, moved_, scan.boxes, scan.index, state.camera)) return;
     for (std::size_t i = 0; i < tracks.size(); ++i)
         follow(tracks.mean_of(i), tracks.covariance_of(i), changes_[i], *motion, camera, now);
     state.camera_path.follow(camera, now, state.width, state.height, step_s);
@@ -60,7 +60,7 @@ void CameraFollower::follow_camera(State& state, std::size_t sensor, const Corre
     const ModelConstants& c = state.constants;
     find_surely_there(state, sensor);
     const CameraMotion motion =
-        estimate_camera(tracks_, scan.boxes, *scan.index, state.width, state.height, dt, state.camera, c);
+        estimate_camera(tracks_, scan.boxes, scan.index, state.width, state.height, dt, state.camera, c);
     if (!motion.known) return;
     const double lasting = (1.0 - exp_of(-dt / c.camera_time_s)) / dt;
     state.camera_path.follow(motion, lasting);

@@ -38,6 +38,7 @@ private:
     }
     static std::vector<Sides> chosen(const CorrectedBoxes& scan, const std::vector<std::size_t>& places) {
         std::vector<Sides> out;
+        out.reserve(places.size());
         for (const std::size_t j : places) out.push_back(scan.boxes[j]);
         return out;
     }

@@ -185,6 +185,7 @@ Out<double> Model::camera_moved() const {
 
 Out<double> Model::last_scans() const {
     std::vector<double> out;
+    out.reserve(now_.state.sensors.size());
     for (const Sensor& sensor : now_.state.sensors) out.push_back(sensor.last_scan_s);
     return array_of(out);
 }

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "arrays.hpp"
@@ -38,7 +37,7 @@ struct CorrectedBoxes {
     std::vector<Sides> boxes;
     std::vector<Edges> edges;
     std::vector<BySide> spreads;  // as of Scan
-    std::optional<ByLeft> index;
+    ByLeft index{{}};
 
     std::size_t size() const { return boxes.size(); }
     // What is expected of one of them by its own spread, of which there is one.

@@ -199,7 +199,7 @@ inline void check_entries(const History& history, const State& state) {
         for (const auto* mean : {&entry.mean, &entry.predicted_mean})
             for (int axis = 0; axis < 2; ++axis)
                 for (const int place : {kLogSize, kGrowth, kSizeError})
-                    require(std::abs((*mean)[static_cast<std::size_t>(axis * kStates + place)]) <= kMostLogSize, name,
+                    require(std::abs((*mean)[static_cast<std::size_t>(axis) * kStates + place]) <= kMostLogSize, name,
                             "hold what is no size");
         std::array<double, kCovariance> whole;
         for (const auto* halves : {&entry.predicted_covariance, &entry.covariance}) {

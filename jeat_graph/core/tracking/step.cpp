@@ -105,7 +105,7 @@ void correct_boxes(const State& state, const Scan& scan, CorrectedBoxes& out) {
         out.boxes.push_back(correction.corrected(box));
         out.edges.push_back(cuts ? edges_of(box, state.width, state.height, c) : Edges{});
     }
-    out.index.emplace(out.boxes);
+    out.index = ByLeft(out.boxes);
 }
 
 // The track that each box of a scan went to, and how far from it the box lay.

@@ -111,7 +111,8 @@ class Tiling:
         tile = np.repeat(np.arange(len(self)), [len(one.scores) for one in found])
         shift = np.tile(self.places[:, :2], 2)[tile]
         corners: FloatArray = np.concatenate([one.corners for one in found]) + shift.astype(float)
-        scores, classes = (np.concatenate([one[k] for one in found]) for k in (1, 2))
+        scores = np.concatenate([one.scores for one in found])
+        classes = np.concatenate([one.classes for one in found])
         depth = self._depths(corners)
         rows = np.arange(len(tile))
         own = depth[rows, tile]

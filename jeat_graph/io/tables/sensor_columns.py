@@ -33,6 +33,8 @@ from jeat_graph.io.tables.known_columns import known_columns
 
 #: Before the key of a sensor's setting, in the name of a column.
 PREFIX = "sensor."
+#: The configuration that takes what tables say of their detectors.
+DECLARING_CONFIG = "default"
 _SENSOR = "sensor"
 
 #: Settings by sensor and key, as `sensors` of a configuration has them.
@@ -129,6 +131,14 @@ def declared_by_all(items: Iterable[tuple[str | None, str | Path]]) -> Declared:
                         path,
                     )
     return found
+
+
+def takes_declared(config: object) -> bool:
+    """Return whether a configuration takes what tables say of their detectors: the one called `default` does.
+
+    Another one, a preset or the user's own, says itself what its sensors are.
+    """
+    return config == DECLARING_CONFIG
 
 
 def as_settings(declared: Mapping[str, Mapping[str, Any]]) -> list[str]:

@@ -14,7 +14,7 @@ from jeat_graph import load_config, read_detections, track
 from jeat_graph.config.schema import Config
 from jeat_graph.data.detections import Detections
 from jeat_graph.data.errors import ConfigError, DataError, InputWarning
-from jeat_graph.io.tables.sensor_columns import as_settings, declared_by_all
+from jeat_graph.io.tables.sensor_columns import as_settings, declared_by_all, takes_declared
 from jeat_graph.rig.common_picture import CommonPicture, in_common
 from jeat_graph.runs.latency import at_measurement
 from jeat_graph_sehn.teaching.dividing import Division, Parts, check_enough, divide, part
@@ -133,7 +133,7 @@ def make_lesson(request: LessonRequest, say: Callable[[str], object] = lambda _:
 def _config(request: LessonRequest) -> Config:
     # As `track` does it: what a table says of its detectors goes with the preset that assumes nothing.
     declared = declared_by_all([(None, _place(path)) for path in request.data])
-    known = as_settings(declared) if request.config == _DEFAULT else []
+    known = as_settings(declared) if takes_declared(request.config) else []
     overrides = [*known, *_SETTINGS, *request.overrides]
     if request.rig is None and not any(one.startswith("image") for one in request.overrides):
         wide, high = request.size_px
