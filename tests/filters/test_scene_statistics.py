@@ -107,6 +107,22 @@ def test_scores_above_which_boxes_come_again_are_found():
     assert score_calibration.decision_threshold(counts, C) == pytest.approx(want)
 
 
+def test_boxes_are_counted_once_each_about_their_logits():
+    """A Gaussian kernel keeps number and mean, and adds its own variance."""
+    counts, scans = score_calibration.no_repetition(), 10
+    boxes = np.arange(3)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+    logits = np.array([-1.3, 0.45, 2.0])
+    for _ in range(scans):
+        counts = score_calibration.count_repetition(counts, boxes, logits, C)
+    total, grid = counts.boxes, score_calibration.SCORE_GRID
+    assert total.sum() == pytest.approx(3 * (scans - 2))  # of those with a scan before and after them
+    mean = total @ grid / total.sum()
+    assert mean == pytest.approx(logits.mean())
+    variance = logits.var() + score_calibration._BANDWIDTH**2
+    assert total @ (grid - mean) ** 2 / total.sum() == pytest.approx(variance)
+    np.testing.assert_allclose(counts.repeated, total, atol=1e-12)  # they all stood
+
+
 def _repeated(
     persistent: float, things: int, scans: int, seed: int = 0, std: float = 1.5
 ) -> score_calibration.RepeatCounts:

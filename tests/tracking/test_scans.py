@@ -7,9 +7,9 @@ import datetime
 import numpy as np
 import pytest
 
-from jeat_graph.data.errors import DataError
+from jeat_graph.data.errors import DataError, UnknownSensorError
 from jeat_graph.data.scan import Scan, time_of
-from jeat_graph.tracking.scans import as_scans
+from jeat_graph.tracking.scans import as_scans, sensor_index
 
 BOXES, SCORES = [[1.0, 2.0, 30.0, 40.0]], [0.9]
 
@@ -68,3 +68,12 @@ def test_what_is_no_scan_is_refused_with_what_is(what):
 def test_a_scan_may_be_a_list_like_its_tuple():
     (scan,) = as_scans([0.5, "rgb", BOXES, SCORES])
     assert (scan.t, scan.sensor, scan.boxes.tolist()) == (0.5, "rgb", BOXES)
+
+
+@pytest.mark.parametrize(("name", "hint"), [("rbg", "did you mean 'rgb'?"), ("lidar", "declared: evt, rgb;")])
+def test_an_unknown_sensor_is_named_with_the_nearest_one_or_all(name, hint):
+    with pytest.raises(UnknownSensorError) as raised:
+        sensor_index(name, ["evt", "rgb"])
+    assert f"sensor {name!r} is not declared" in str(raised.value)
+    assert hint in str(raised.value)
+    assert sensor_index("rgb", ["evt", "rgb"]) == 1
