@@ -68,6 +68,7 @@ TERMS: dict[str, dict[str, Any]] = {
     },
     "false objects that two sensors share": {"shared_false": _NEVER},
     "scores that other sensors contradict": {"agreed_std": _FIRM},
+    "which of two sensors is off, by aspects": {"aspect_pairs": _FIRM},
     "scores that say nothing": {"no_meaning_share": _NEVER},
     "second boxes": {"duplicate_weight": 0.0},
     "a track's own P_D": {"p_detect_strength": _FIRM},

@@ -19,12 +19,15 @@ from jeat_graph.io.tables.truth_io import write_truth
 
 SHIPPED = ModelConstants()
 #: Found only where something cuts boxes, where two sensors differ in size, where scores tell little, or where
-#: a sensor is alone, or worse than what sides of compared sensors have at least.
+#: a sensor is alone, or worse than what sides of compared sensors have at least; or what a few seconds do not
+#: show, or recordings whose scores all mean something.
 QUIET = {
     "learnt box noise",
     "sides that show again",
     "the decision threshold (fixed at even odds)",
     "gaps that begin with a box that confirms",
+    "which of two sensors is off, by aspects",
+    "scores that say nothing",
 }
 
 

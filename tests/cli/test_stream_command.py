@@ -24,6 +24,8 @@ from jeat_graph.io.tables.trajectories_io import MEAN, VAR, read_trajectories
 COMMAND = [sys.executable, "-m", "jeat_graph.cli.main", "stream"]
 PATIENCE_S = 120.0
 IMAGE = ("--image", "1280x720")
+#: What the recording's table says of its sensors, which `track` reads and scans do not say.
+KINDS = ("--set", "sensors.evt.kind=event", "--set", "sensors.rgb.kind=camera")
 #: A sensor that is not declared is told of on stderr.
 DECLARED = ("--set", "sensors.rgb.rate_hz=20")
 
@@ -126,7 +128,7 @@ def test_an_empty_line_of_csv_completes_a_scan_at_once(start):
 
 
 def test_csv_out_is_byte_for_byte_the_causal_table_of_track(joint_lines, tracked, monkeypatch, capsys):
-    code, out, _ = stream(joint_lines, monkeypatch, capsys, *IMAGE, "--format", "csv")
+    code, out, _ = stream(joint_lines, monkeypatch, capsys, *IMAGE, *KINDS, "--format", "csv")
     assert code == 0
     assert out == (tracked / "causal.csv").read_text()
 
@@ -138,14 +140,14 @@ def test_csv_in_and_out_is_the_causal_table_too(
 
     write_detections(detections, tmp_path / "ordered.csv")
     text = (tmp_path / "ordered.csv").read_bytes()
-    code, out, _ = stream(text, monkeypatch, capsys, *IMAGE, "--format", "csv")
+    code, out, _ = stream(text, monkeypatch, capsys, *IMAGE, *KINDS, "--format", "csv")
     assert code == 0
     assert out == (tracked / "causal.csv").read_text()
 
 
 def test_joint_takes_scans_of_one_time_together_as_track_does(detections, tracked, monkeypatch, capsys):
     lines = "".join(scan_line(scan) for scan in reversed_within_times(detections))
-    code, out, _ = stream(lines, monkeypatch, capsys, *IMAGE, "--joint", "--format", "csv")
+    code, out, _ = stream(lines, monkeypatch, capsys, *IMAGE, *KINDS, "--joint", "--format", "csv")
     assert code == 0
     assert out == (tracked / "causal.csv").read_text()
 
@@ -156,7 +158,7 @@ def reversed_within_times(detections):
 
 
 def test_json_out_holds_the_numbers_of_the_causal_table(joint_lines, tracked, monkeypatch, capsys):
-    _, out, _ = stream(joint_lines, monkeypatch, capsys, *IMAGE)
+    _, out, _ = stream(joint_lines, monkeypatch, capsys, *IMAGE, *KINDS)
     table = read_trajectories(tracked / "causal.csv")
     steps = [json.loads(text) for text in out.splitlines()]
     rows = [(step["t"], track) for step in steps for track in step["tracks"]]
@@ -176,7 +178,7 @@ def test_smoothed_has_the_rows_of_the_smoothed_table_of_track(
     joint_lines, tracked, monkeypatch, capsys, tmp_path
 ):
     path = tmp_path / "s.csv"
-    code, _, _ = stream(joint_lines, monkeypatch, capsys, *IMAGE, "--smoothed", path)
+    code, _, _ = stream(joint_lines, monkeypatch, capsys, *IMAGE, *KINDS, "--smoothed", path)
     assert code == 0
     written, table = (file.read_text().splitlines() for file in (path, tracked / "smoothed.csv"))
     assert written[0] == table[0]
@@ -310,7 +312,7 @@ def test_late_scans_go_where_they_belong(monkeypatch, capsys, detections, tracke
     order = np.argsort(detections.scan_t + delay, kind="stable")
     lines = "".join(scan_line(detections.scan(int(k))) for k in order)
     path, record = tmp_path / "s.csv", tmp_path / "record.json"
-    options = (*IMAGE, "--smoothed", path, "--record", record)
+    options = (*IMAGE, *KINDS, "--smoothed", path, "--record", record)
     code, out, err = stream(lines, monkeypatch, capsys, *options)
     assert code == 0
     assert len(out.splitlines()) == detections.num_scans
