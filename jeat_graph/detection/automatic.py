@@ -147,6 +147,8 @@ def chosen_by(
     if anything_moves or any(one.trusted for one in found):
         convinced(chosen)
     say(f"detector: {chosen}, by the first {SAMPLE_S:g} s ({tried}); --detector-frames NAME takes another")
+    if chosen == MOTION:
+        say("what moves is found, be it a vehicle or not, and what stands is not: a network is better")
     return chosen
 
 
