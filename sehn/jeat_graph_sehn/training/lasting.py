@@ -1,9 +1,10 @@
 """A memory that knows how much time has passed: leaky counts of events, and states that last as learnt.
 
-Where a vehicle stands there are no events. What is remembered of it then lasts, for the update gate closes
-where no more events come than noise makes, and each channel forgets with a time constant of its own, which
-is learnt: after Δt of any length a share exp(-Δt/τ) is left. What creeps shows in the sum of some seconds: of
-each polarity there are leaky averages of the rate of events, in units of what most of the picture has: noise.
+Where a vehicle stands there are no events. What is remembered of it then lasts, for a gate closes where no
+more events come than noise makes: nothing is learned there, and nothing is forgotten. Where it is open, each
+channel forgets with a time constant of its own, which is learnt: after Δt of any length a share exp(-gΔt/τ)
+is left, g how far the gate is open. What creeps shows in the sum of some seconds: of each polarity there are
+leaky averages of the rate of events, in units of what most of the picture has: noise.
 """
 
 from __future__ import annotations
@@ -34,9 +35,16 @@ _LEAST_HZ = 0.5
 #: so far apart on average (s).
 _USUAL_STEP_S = 0.035
 _FIRST_S = (0.05, 30.0)
-#: The gate at first: wide open, and wider where more comes than noise in the shortest average. One that
-#: closed at once, untrained, cost 12 points of AP50 (of 73), with these times and with 3 s.
-_FIRST_GAIN, _FIRST_OFFSET = 1.0, 4.0
+#: Of so many cells about each one, by side, the gate sees the sum: a vehicle's inside has few events.
+_NEARBY = 3
+#: By so many standard deviations of the noise it counts, up to this many times that.
+_DEVIATIONS, _MOST_TIMES = 10.0, 2.0
+#: Anscombe's: with it roots of few events spread as those of many.
+_ADDED = 0.375
+#: The gate at first: half open at ten standard deviations in the shortest average, both polarities together.
+#: A network that is to learn to remember does not get there from one that forgets: gradients go back a few
+#: windows. What to forget shows at once, in boxes where nobody is any more.
+_FIRST_GAIN, _FIRST_OFFSET = 5.0, -5.0
 
 
 class SinceThen(NamedTuple):
@@ -44,11 +52,13 @@ class SinceThen(NamedTuple):
 
     Attributes:
         elapsed_s: (L x B,) time since the window before each (s); at the first that of the window itself.
-        activity: (L x B, 6, H/4, W/4) logarithm of the leaky averages, in units of the noise.
+        rates: (L x B, 6, H/4, W/4) leaky averages of events (1/s).
+        noise: (L x B, 6, 1, 1) of these what most of the picture has.
     """
 
     elapsed_s: Tensor
-    activity: Tensor
+    rates: Tensor
+    noise: Tensor
 
 
 class Traces(nn.Module):
@@ -80,8 +90,10 @@ class Traces(nn.Module):
         spans = torch.tensor(SPANS_S).repeat_interleave(2).repeat(2)
         self.register_buffer("spans", spans, persistent=False)
 
-    def follow(self, counts: Tensor, state: Tensor, length: int, elapsed_s: Tensor) -> tuple[Tensor, Tensor]:
-        """Return the activity (L x B, 6, H/4, W/4) of windows that follow one another, and the last state.
+    def follow(
+        self, counts: Tensor, state: Tensor, length: int, elapsed_s: Tensor
+    ) -> tuple[SinceThen, Tensor]:
+        """Return what comes in windows that follow one another, and the last state.
 
         Args:
             counts: (L x B, 2 x bins, H, W), from old to new, each first darker, then brighter.
@@ -104,18 +116,20 @@ class Traces(nn.Module):
             state = state * share + now * (1.0 - share)
             found.append(state)
         together = torch.cat(found) if length > 1 else state
-        logs = torch.log(together[:, :FEATURES] / together[:, FEATURES:] + _LEAST_HZ)
-        noise = logs[:, FEATURES - 2 :].mean(dim=(2, 3), keepdim=True)
-        return logs - torch.cat([noise] * len(SPANS_S), dim=1), state
+        averages = together[:, :FEATURES] / together[:, FEATURES:]
+        logs = torch.log(averages[:, FEATURES - 2 :] + _LEAST_HZ)
+        noise = torch.exp(logs.mean(dim=(2, 3), keepdim=True)) - _LEAST_HZ
+        return SinceThen(elapsed_s, averages, torch.cat([noise] * len(SPANS_S), dim=1)), state
 
-    def forward(self, activity: Tensor) -> Tensor:
+    def forward(self, passed: SinceThen) -> Tensor:
         """Return what is added to the features (L x B, channels, H/4, W/4)."""
+        activity = torch.log((passed.rates + _LEAST_HZ) / (passed.noise + _LEAST_HZ))
         added: Tensor = self.carry(torch.relu(self.see(activity)))
         return added
 
 
 class Lasting(nn.Module):
-    """How long each channel of a state lasts, and where it may change.
+    """Where a state may change, and how long each of its channels lasts there.
 
     Args:
         channels: of the state.
@@ -123,8 +137,10 @@ class Lasting(nn.Module):
         keep: share that is left at a window of usual length, at first.
 
     Attributes:
-        log_hz: (channels,) logarithm of 1/τ (1/s).
+        log_hz: (channels,) logarithm of 1/τ (1/s) where the gate is open.
     """
+
+    counts: Tensor
 
     def __init__(self, channels: int, stride: int, keep: float) -> None:
         super().__init__()
@@ -133,21 +149,41 @@ class Lasting(nn.Module):
         lasts_s = long if keep >= 1.0 else -_USUAL_STEP_S / math.log(max(keep, 1e-9))
         first = math.log(min(max(lasts_s, short), long))
         self.log_hz = nn.Parameter(torch.full((channels,), -first))
+        # How many events an average of 1/s is nearby.
+        spans = torch.tensor(SPANS_S).repeat_interleave(2)
+        counts = 2.0 * float(_NEARBY * self._times) ** 2 * spans
+        self.register_buffer("counts", counts[:, None, None], persistent=False)
         self.open = nn.Conv2d(FEATURES, channels, 1)
         nn.init.zeros_(self.open.weight)
         with torch.no_grad():
-            self.open.weight[:, :2] = _FIRST_GAIN
+            self.open.weight[:, :2] = _FIRST_GAIN / math.sqrt(2.0)
             assert self.open.bias is not None
             self.open.bias.fill_(_FIRST_OFFSET)
 
-    def shares(self, elapsed_s: Tensor) -> Tensor:
-        """Return the share (N, channels, 1, 1) of a state that is left after times (N,) in seconds."""
-        return torch.exp(-elapsed_s[:, None] * torch.exp(self.log_hz))[:, :, None, None]
+    def shares(self, elapsed_s: Tensor, opened: Tensor) -> Tensor:
+        """Return the share (N, channels, H, W) of a state that is left after times (N,) in seconds.
 
-    def opened(self, activity: Tensor) -> Tensor:
-        """Return how far the update gate may open (N, channels, H/stride, W/stride), 0 to 1."""
-        nearby = nn.functional.max_pool2d(activity, self._times)
-        return torch.sigmoid(self.open(nearby))
+        Args:
+            elapsed_s: times.
+            opened: (N, channels, H, W) how far the gate is open.
+        """
+        rates = elapsed_s[:, None] * torch.exp(self.log_hz)
+        return torch.exp(-opened * rates[:, :, None, None])
+
+    def opened(self, passed: SinceThen) -> Tensor:
+        """Return how far the gate is open (N, channels, H/stride, W/stride), 0 to 1.
+
+        It sees by how many standard deviations more events come nearby than noise makes: twice the difference
+        of the roots of what came and what is expected, in twice an average's time constant. In the dark,
+        where noise is strong, what moves makes little more than that, and yet certainly more.
+
+        Source: Anscombe, "The transformation of Poisson, binomial and negative-binomial data" (1948).
+        """
+        nearby = nn.functional.avg_pool2d(passed.rates, self._times)
+        nearby = nn.functional.avg_pool2d(nearby, _NEARBY, 1, _NEARBY // 2, count_include_pad=False)
+        came, expected = (torch.sqrt(one * self.counts + _ADDED) for one in (nearby, passed.noise))
+        above = (2.0 / _DEVIATIONS) * (came - expected)
+        return torch.sigmoid(self.open(torch.clamp(above, -_MOST_TIMES, _MOST_TIMES)))
 
 
 def remembered_by_time(
@@ -163,7 +199,8 @@ def remembered_by_time(
         length: L.
         passed: time, and what came.
     """
-    shares, opened = lasting.shares(passed.elapsed_s), lasting.opened(passed.activity)
+    opened = lasting.opened(passed)
+    shares = lasting.shares(passed.elapsed_s, opened)
     seen = []
     for one, share, gate in zip(x.chunk(length), shares.chunk(length), opened.chunk(length), strict=True):
         state = memory(one, share * state, gate)

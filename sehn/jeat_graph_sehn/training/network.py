@@ -89,9 +89,8 @@ class Backbone(nn.Module):
         traced: tuple[Tensor, ...] = ()
         if self.traces is not None:
             assert elapsed_s is not None, "a memory by time gets how much has passed"
-            activity, followed = self.traces.follow(x, state[2], length, elapsed_s)
-            fine = fine + self.traces(activity)
-            passed, traced = SinceThen(elapsed_s, activity), (followed,)
+            passed, followed = self.traces.follow(x, state[2], length, elapsed_s)
+            fine, traced = fine + self.traces(passed), (followed,)
         middle, of_middle = self._recall(0, self.to_8(fine), state, length, passed)
         coarse, of_coarse = self._recall(1, self.to_16(middle), state, length, passed)
         return (fine, middle, coarse), (of_middle, of_coarse, *traced)

@@ -30,6 +30,7 @@ SIDE = (48, 32)
 NET = NetSettings(kind="events", width=4, memory="time")
 LENGTH, BATCH = 3, 2
 BIN_S = 0.005
+OPEN = torch.ones(1, 1, 1, 1)
 
 
 def counts_of(rate_hz, steps):
@@ -76,60 +77,86 @@ def test_an_average_falls_with_its_time_constant_once_events_stop():
 
 
 @pytest.mark.parametrize("times", [0.5, 4.0])
-def test_activity_is_in_units_of_the_noise(times):
+def test_what_is_added_goes_by_the_noise(times):
     """A sensor with so many times the noise and so many times the events shows the same."""
+    torch.manual_seed(2)
     traces = Traces(NET, 8)
+    torch.nn.init.normal_(traces.carry.weight)
 
-    def activity(factor):
-        counts = counts_of(20.0 * factor, 1)
+    def added(factor):
+        counts = counts_of(200.0 * factor, 1)
         counts[:, :, :8, :8] *= 5.0
         state = torch.zeros(1, TRACE_CHANNELS, SIDE[1] // 4, SIDE[0] // 4)
-        found, _ = traces.follow(counts, state, 1, torch.tensor([0.05]))
-        return found
+        passed, _ = traces.follow(counts, state, 1, torch.tensor([0.05]))
+        with torch.no_grad():
+            return traces(passed)
 
-    torch.testing.assert_close(activity(times), activity(1.0), atol=0.02, rtol=0.0)
-    assert activity(times)[0, :, 0, 0].min() > 1.0
+    torch.testing.assert_close(added(times), added(1.0), atol=0.02, rtol=0.0)
+    assert added(1.0)[0, :, 0, 0].abs().max() > 0.1
+
+
+def coming(hz, noise_hz, side=(20, 8)):
+    """Return what a memory gets where so many events a second come in one cell, and noise elsewhere."""
+    rates = torch.full((1, 6, side[1], side[0]), noise_hz)
+    rates[:, :, 2, 3] = hz
+    return SinceThen(torch.tensor([0.05]), rates, torch.full((1, 6, 1, 1), noise_hz))
 
 
 def test_a_state_lasts_by_time_and_not_by_windows():
     lasting = Lasting(6, 8, 0.9)
     torch.nn.init.normal_(lasting.log_hz)
-    once = lasting.shares(torch.tensor([0.1]))
-    often = lasting.shares(torch.full((5,), 0.02)).prod(dim=0, keepdim=True)
+    once = lasting.shares(torch.tensor([0.1]), OPEN)
+    often = lasting.shares(torch.full((5,), 0.02), OPEN).prod(dim=0, keepdim=True)
     torch.testing.assert_close(once, often)
     assert len(set(once.flatten().tolist())) == 6, "each channel has a time constant of its own"
 
 
 @pytest.mark.parametrize(("keep", "left"), [(0.9, 0.9), (0.5, 0.5), (1.0, 0.9988), (0.0, 0.4966)])
 def test_at_first_a_state_lasts_as_one_that_goes_by_windows_of_the_usual_length(keep, left):
-    """But for one that would last for ever or not at all: between 0.05 and 30 s."""
-    found = Lasting(3, 8, keep).shares(torch.tensor([0.035])).flatten()
+    """Where events come; but for one that would last for ever or not at all: between 0.05 and 30 s."""
+    found = Lasting(3, 8, keep).shares(torch.tensor([0.035]), OPEN).flatten()
     torch.testing.assert_close(found, torch.full((3,), left), atol=1e-4, rtol=0.0)
 
 
-def test_the_gate_opens_by_the_most_that_comes_in_a_cell():
+@pytest.mark.parametrize("noise_hz", [0.0, 3.0, 50.0])
+def test_the_gate_opens_by_what_comes_in_a_cell_and_beside_it(noise_hz):
     lasting = Lasting(6, 16, 0.9)
-    with torch.no_grad():
-        lasting.open.bias.fill_(-4.0)
-    activity = torch.zeros(1, 6, 8, 12)
-    activity[:, :, 2, 3] = 4.0
-    opened = lasting.opened(activity)
-    assert opened.shape == (1, 6, 2, 3)
+    opened = lasting.opened(coming(20_000.0, noise_hz))
+    assert opened.shape == (1, 6, 2, 5)
     assert opened[0, :, 0, 0].min() > 0.95
-    assert opened[0, :, 1, 2].max() < 0.05
+    assert opened[0, :, 1, 1].min() > 0.95, "a vehicle's inside has few events"
+    assert opened[0, :, :, 2:].max() < 0.05
 
 
-def test_a_gate_that_is_closed_leaves_a_state_as_it_was_but_for_time():
+@pytest.mark.parametrize("noise_hz", [1.0, 10.0, 100.0])
+def test_the_gate_opens_by_what_chance_does_not_make(noise_hz):
+    """Ten standard deviations more than noise, of both polarities together, open it by half."""
+    lasting = Lasting(2, 8, 0.9)
+    cells = 36.0
+    expected = 2.0 * 0.1 * cells * 2.0 * noise_hz
+    more = 10.0 * np.sqrt(expected) + 25.0  # (√n + 5)²
+    evenly = coming(noise_hz, noise_hz)
+    passed = evenly._replace(rates=evenly.rates + more / (2.0 * 0.1 * cells * 2.0))
+    torch.testing.assert_close(lasting.opened(passed), torch.full((1, 2, 4, 10), 0.5), atol=0.15, rtol=0.0)
+
+
+def test_at_first_what_is_remembered_stays_where_only_noise_comes():
+    """A network by windows has forgotten half of it after a quarter of a second."""
+    lasting = Lasting(4, 8, 0.9)
+    shares = lasting.shares(torch.tensor([0.25]), lasting.opened(coming(10.0, 10.0)))
+    assert shares.min() > 0.95
+
+
+def test_a_gate_that_is_closed_leaves_a_state_as_it_was():
     torch.manual_seed(3)
     memory, lasting = ConvGru(4), Lasting(4, 8, 0.9)
     with torch.no_grad():
         lasting.open.bias.fill_(-50.0)
-    state, elapsed = torch.rand(1, 4, 4, 6), torch.full((3,), 0.05)
+    state, noise = torch.rand(1, 4, 4, 6), torch.zeros(3, 6, 1, 1)
+    passed = SinceThen(torch.full((3,), 0.05), torch.zeros(3, 6, 8, 12), noise)
     with torch.no_grad():
-        _, last = remembered_by_time(
-            memory, lasting, torch.rand(3, 4, 4, 6), state, 3, SinceThen(elapsed, torch.zeros(3, 6, 8, 12))
-        )
-    torch.testing.assert_close(last, state * lasting.shares(torch.tensor([0.15])))
+        _, last = remembered_by_time(memory, lasting, torch.rand(3, 4, 4, 6), state, 3, passed)
+    torch.testing.assert_close(last, state)
 
 
 def test_a_network_that_went_by_windows_goes_on_by_time(tmp_path):
