@@ -96,6 +96,7 @@ def count(sums: AccuracySums, sensor: int, other: int, now: FloatArray, before: 
     pairs, product, aspect = sums.pairs.copy(), sums.product.copy(), sums.aspect.copy()
     d, before_d, u, before_u = now[:, :-1], before[:, :-1], now[:, -1], before[:, -1]
     e, before_e = d[:, 2] - d[:, 3], before_d[:, 2] - before_d[:, 3]
+    of_pairs = float(products(d, before_d).sum())
     new = np.array(
         [
             (u + before_u).sum(),
@@ -108,9 +109,14 @@ def count(sums: AccuracySums, sensor: int, other: int, now: FloatArray, before: 
     )
     for row, column, sign in ((sensor, other, 1.0), (other, sensor, _SIGN)):
         pairs[row, column] += len(now)
-        product[row, column] += (d * before_d * _TO_SIDES).sum()
+        product[row, column] += of_pairs
         aspect[row, column] += sign * new
     return sums._replace(pairs=pairs, product=product, aspect=aspect)
+
+
+def products(d: FloatArray, before: FloatArray) -> FloatArray:
+    """Return the products (K,), as variances of sides, of differences (K, 4) and those before them (K, 4)."""
+    return np.asarray((d * before * _TO_SIDES).sum(axis=1))
 
 
 def aspect_sum(boxes: FloatArray, others: FloatArray, c: ModelConstants) -> FloatArray:
