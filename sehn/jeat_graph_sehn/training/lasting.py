@@ -42,8 +42,8 @@ _DEVIATIONS, _MOST_TIMES = 10.0, 2.0
 #: Anscombe's: with it roots of few events spread as those of many.
 _ADDED = 0.375
 #: The gate at first: half open at ten standard deviations in the shortest average, both polarities together.
-#: From a gate that was wide open two trainings did not get to one that closes: gradients go back a few windows.
-#: What to forget shows at once, in boxes where nobody is any more.
+#: From a gate that was wide open two trainings did not get to one that closes: gradients go back a few
+#: windows. What to forget shows at once, in boxes where nobody is any more.
 _FIRST_GAIN, _FIRST_OFFSET = 5.0, -5.0
 
 
