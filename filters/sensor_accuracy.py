@@ -84,7 +84,7 @@ def widened(sums: AccuracySums, lasting: float = 0.0) -> AccuracySums:
 
 
 def count(sums: AccuracySums, sensor: int, other: int, now: FloatArray, before: FloatArray) -> AccuracySums:
-    """Return the sums with pairs of what two sensors said of a track, `now` and `before` (K, 5).
+    """Return the sums with how two sensors compare on K tracks, `now` and `before` (K, 5).
 
     Args:
         sums: so far.

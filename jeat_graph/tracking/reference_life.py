@@ -63,8 +63,8 @@ def compare_sensors(state: ReferenceState, given: SensorScan, assigned: IntArray
             mean = sensor_offsets.mean_difference(state.offsets, k, other, c)
             state.offsets = sensor_offsets.count(state.offsets, k, other, d, c)
             u = sensor_accuracy.aspect_sum(given.boxes[usable], before[usable], c)
-            said = np.column_stack([sensor_accuracy.clipped(d, mean, c), u])
-            compare_errors(state, row[usable], k, other, said, c)
+            compared = np.column_stack([sensor_accuracy.clipped(d, mean, c), u])
+            compare_errors(state, row[usable], k, other, compared, c)
     tracks = state.tracks
     last_box, last_box_s = tracks.last_box.copy(), tracks.last_box_s.copy()
     last_box[row, k], last_box_s[row, k] = given.boxes, state.time
@@ -72,18 +72,18 @@ def compare_sensors(state: ReferenceState, given: SensorScan, assigned: IntArray
 
 
 def compare_errors(
-    state: ReferenceState, row: IntArray, k: int, other: int, said: FloatArray, c: ModelConstants
+    state: ReferenceState, row: IntArray, k: int, other: int, compared: FloatArray, c: ModelConstants
 ) -> None:
-    """Count what lasts of what two sensors say (K, 5) of tracks; keep it where the last is old."""
+    """Count what lasts of how two sensors compare on tracks (K, 5); keep it where the last is old."""
     tracks = state.tracks
     age = np.where(tracks.has_apart[row, k, other], state.time - tracks.apart_s[row, k, other], np.inf)
     old = age >= c.lasting_after_s
     pairs = old & (age <= c.lasting_within_s)
     before = tracks.apart[row[pairs], k, other]
-    state.accuracy = sensor_accuracy.count(state.accuracy, k, other, said[pairs], before)
+    state.accuracy = sensor_accuracy.count(state.accuracy, k, other, compared[pairs], before)
     apart, apart_s, has_apart = tracks.apart.copy(), tracks.apart_s.copy(), tracks.has_apart.copy()
     apart[row[old], k, other], apart_s[row[old], k, other], has_apart[row[old], k, other] = (
-        said[old],
+        compared[old],
         state.time,
         True,
     )

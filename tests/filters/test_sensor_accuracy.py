@@ -29,11 +29,11 @@ def sums_of(lasting, jitter, objects=400, seed=0):
     first, later = boxes(), boxes()
     for s in range(len(lasting)):
         for o in range(s):
-            said = []
+            compared = []
             for seen in (later, first):
                 both = seen[s] + seen[o]
-                said.append(np.column_stack([seen[s] - seen[o], aspect + both[:, 2] - both[:, 3]]))
-            sums = sa.count(sums, s, o, *said)
+                compared.append(np.column_stack([seen[s] - seen[o], aspect + both[:, 2] - both[:, 3]]))
+            sums = sa.count(sums, s, o, *compared)
     return sums
 
 

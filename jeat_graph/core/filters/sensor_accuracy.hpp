@@ -15,10 +15,10 @@
 
 namespace jeat::filters {
 
-inline constexpr std::size_t kSaid = 5;  // differences of two sensors (4), and the sum of both aspects
+inline constexpr std::size_t kCompared = 5;  // differences of two sensors (4), and the sum of both aspects
 // Sums over both times of a pair of u, u², e, e²; of e e', and of (e u' + e' u) / 2.
 enum AspectSum : std::size_t { kSum, kSumSquare, kDifference, kDifferenceSquare, kLasting, kLeaning, kAspectSums };
-using Said = std::array<double, kSaid>;
+using Compared = std::array<double, kCompared>;
 
 struct AccuracySums {
     std::vector<double> pairs, product;  // (S, S)
@@ -35,8 +35,8 @@ struct AccuracySums {
         lasting.push_back(believed);
     }
 
-    // A pair of what two sensors said of a track, and had said of it before.
-    void count(std::size_t i, std::size_t j, const Said& now, const double* before) {
+    // How two sensors compare on a track now, and how they did before.
+    void count(std::size_t i, std::size_t j, const Compared& now, const double* before) {
         const std::size_t S = sensors(), at = i * S + j, back = j * S + i;
         double of_pair = 0.0;
         for (std::size_t k = 0; k < 4; ++k) of_pair += now[k] * before[k] * kToSides[k];
@@ -116,8 +116,7 @@ private:
         const double prior = (missed - other) / std::max(missed + other, kLeastShare);
         const double per_square = pairs[at] / c.aspect_pairs / std::max(var_u * var_e, kLeastShare);
         const double precise = 1.0 / square(c.aspect_prior);
-        const double delta =
-            (prior * precise + per_square * apart * leaning) / (precise + per_square * square(apart));
+        const double delta = (prior * precise + per_square * apart * leaning) / (precise + per_square * square(apart));
         return 0.5 + 0.5 * clamp(delta, -1.0, 1.0);
     }
 

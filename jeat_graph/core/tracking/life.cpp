@@ -46,16 +46,16 @@ private:
     ByLeft tracks_, boxes_;
 };
 
-// Count what lasts of what two sensors say of a track; keep it where the last is old.
-void compare_errors(State& state, std::size_t row, std::size_t k, std::size_t other, const Said& said) {
+// Count what lasts of how two sensors compare on a track; keep it where the last is old.
+void compare_errors(State& state, std::size_t row, std::size_t k, std::size_t other, const Compared& compared) {
     Tracks& tracks = state.tracks;
     const ModelConstants& c = state.constants;
     const std::size_t S = state.sensors.size(), at = (row * S + k) * S + other;
     const double age = tracks.has_apart[at] ? state.t - tracks.apart_s[at] : std::numeric_limits<double>::infinity();
     if (age < c.lasting_after_s) return;
-    double* const before = tracks.apart.data() + at * kSaid;
-    if (age <= c.lasting_within_s) state.accuracy.count(k, other, said, before);
-    std::copy(said.begin(), said.end(), before);
+    double* const before = tracks.apart.data() + at * kCompared;
+    if (age <= c.lasting_within_s) state.accuracy.count(k, other, compared, before);
+    std::copy(compared.begin(), compared.end(), before);
     tracks.apart_s[at] = state.t;
     tracks.has_apart[at] = 1;
 }

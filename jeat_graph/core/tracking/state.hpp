@@ -64,7 +64,7 @@ struct Tracks {
         visit("recent_misses", recent_misses, S);
         visit("last_box", last_box, S);
         visit("last_box_s", last_box_s, S);
-        visit("apart", apart, S * S * kSaid);
+        visit("apart", apart, S * S * kCompared);
         visit("apart_s", apart_s, S * S);
         visit("has_apart", has_apart, S * S);
         visit("innovation", innovation, 4);
@@ -87,7 +87,7 @@ struct Tracks {
         widen_rows(last_box, rows, S, 1);
         widen_rows(last_box_s, rows, S, 1);
         widen_rows(sees, rows, S, 1);
-        widen_pairs(apart, rows, S, kSaid);
+        widen_pairs(apart, rows, S, kCompared);
         widen_pairs(apart_s, rows, S, 1);
         widen_pairs(has_apart, rows, S, 1);
         evidence.widen();
