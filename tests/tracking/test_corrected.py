@@ -11,7 +11,7 @@ from jeat_graph import Detections, Scan, Tracker, load_config
 from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.corrected_tracks import CorrectedTracks, Disagreements
 from jeat_graph.data.errors import DataError, JeatGraphError
-from jeat_graph.tracking.identities.disagreeing import RowsCompared, edited
+from jeat_graph.tracking.identities.disagreeing import Noise, RowsCompared, edited
 from jeat_graph.tracking.identities.matching_rows import LEAST_IOU, nearest, owners_of, period_of
 from jeat_graph.tracking.records import record_tracks
 
@@ -136,3 +136,12 @@ def test_records_of_a_run_are_those_of_its_causal_tracks():
     )
     assert [one.track_id for one in whole[0]] == [one.track_id for one in causal[0]] == [1]
     np.testing.assert_array_equal(whole[1].boxes, causal[1].boxes)
+
+
+def test_the_noise_of_centres_and_sizes_is_that_of_drawn_sides():
+    box, noise = np.array([[100.0, 50.0, 80.0, 20.0]]), Noise(0.05**2, 0.7, None)
+    std = np.sqrt(noise.variance * (0.5 * np.sqrt(80.0 * 20.0) + 0.5 * box[0, 2:]) ** 2 + 0.7**2)
+    low, high = np.random.default_rng(0).normal(0.0, std, (2, 200_000, 2))
+    drawn = np.concatenate([((low + high) / 2.0).var(axis=0), (high - low).var(axis=0)])
+    # A variance of n draws has the relative standard deviation √(2/n), here 0.3 %.
+    assert noise.of(box)[0] == pytest.approx(drawn, rel=0.015)

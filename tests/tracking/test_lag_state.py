@@ -17,6 +17,7 @@ from jeat_graph.data.errors import DataError, JeatGraphError
 from jeat_graph.io.files.packing import pack
 from jeat_graph.live.late import LiveTracker
 from jeat_graph.tracking.checkpoint import _codecs, save_state
+from jeat_graph.tracking.identities.saved_parts import whole_number
 
 TIMES = 20 if os.environ.get("JEAT_GRAPH_FULL", "") not in ("", "0") else 1
 RATE_HZ = 20.0
@@ -282,3 +283,10 @@ def test_what_is_of_other_identities_is_refused(missing, tracker, tmp_path):
     save_state(tmp_path / "state.npz", one.config, one.state() | other)
     with pytest.raises(DataError, match="is damaged: what was decided with a lag is missing"):
         Tracker.load(tmp_path / "state.npz")
+
+
+@pytest.mark.parametrize("value", [-1, 8, True, 3.0, "3", None])
+def test_what_is_no_whole_number_within_bounds_is_refused(value):
+    with pytest.raises(DataError, match="is damaged"):
+        whole_number(value, 7)
+    assert [whole_number(good, 7) for good in (0, 7)] == [0, 7]
