@@ -106,7 +106,7 @@ def _sway(one: JudgedRecording) -> JudgedRecording:
         return _SWAY_PX * np.stack([np.sin(phase), 0.5 * np.cos(1.3 * phase), zero, zero], axis=1)
 
     d, truth = one.detections, one.truth
-    t = np.repeat(d.scan_t, np.diff(d.scan_start))
+    t = d.box_t
     moved = GroundTruth(
         t=truth.t,
         object_id=truth.object_id,

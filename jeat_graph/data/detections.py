@@ -270,6 +270,16 @@ class Detections(DetectionViews):
         """Times of one sensor's scans (s), not decreasing."""
         return np.asarray(self.scan_t[self.scan_sensor == self.sensors.index(sensor)])
 
+    @property
+    def box_t(self) -> FloatArray:
+        """Times (N,) of all boxes (s)."""
+        return np.repeat(self.scan_t, np.diff(self.scan_start))
+
+    @property
+    def box_sensor(self) -> IntArray:
+        """Indices (N,) into `sensors` of all boxes."""
+        return np.repeat(self.scan_sensor, np.diff(self.scan_start))
+
     def scans(self) -> Iterator[Scan]:
         """Iterate over the scans in time order."""
         return (self.scan(k) for k in range(self.num_scans))

@@ -106,7 +106,7 @@ class CommonPicture:
             return detections
         boxes, seen = detections.boxes.copy(), np.ones(len(detections), dtype=bool)
         t = detections.scan_t.copy()
-        of_row = np.repeat(detections.scan_sensor, np.diff(detections.scan_start))
+        of_row = detections.box_sensor
         for code, name in enumerate(detections.sensors):
             way = self.ways.get(name, _NO_WAY)
             if way.clock is not None:

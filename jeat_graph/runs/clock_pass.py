@@ -48,9 +48,7 @@ def find_clocks(
     wanted = [name for name in detections.sensors if not _is_set(config, name)]
     if config.input.clocks != "find" or len(wanted) < 2:
         return detections, {}, []
-    counts = np.bincount(
-        np.repeat(detections.scan_sensor, np.diff(detections.scan_start)), minlength=len(detections.sensors)
-    )
+    counts = np.bincount(detections.box_sensor, minlength=len(detections.sensors))
     reference = max(wanted, key=lambda name: counts[detections.sensors.index(name)])
     first = detections.select(reference)
     ahead: dict[str, FoundClock] = {}

@@ -238,9 +238,9 @@ class RunSteps:
 
     def _low_scores(self) -> str | None:
         """Return what to do if a sensor's scores are what its boxes are taken for false by."""
-        owner = np.repeat(self._detections.scan_sensor, np.diff(self._detections.scan_start))
-        for k, (name, state) in enumerate(self._tracker.sensor_states().items()):
-            scores = self._detections.scores[owner == k]
+        states, sensor_of = self._tracker.sensor_states(), self._detections.box_sensor
+        for k, name in enumerate(self._detections.sensors):
+            state, scores = states[name], self._detections.scores[sensor_of == k]
             if len(scores) and np.quantile(scores, _MOSTLY) < state.even_score:
                 half = np.median(scores) / 2
                 return (

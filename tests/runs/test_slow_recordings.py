@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pandas import concat
 
 from jeat_graph import Detections, GroundTruth, Tracker, Trajectories, evaluate, load_config, track
 from jeat_graph.cli.main import main
 
-DURATION_S, IMAGE, NOISE_PX, FOUND = 36.0, (1280, 720), 2.0, 0.91
-#: Top (px) and speed (px/s) of each lane: vehicles drive two to four times their size in a second.
-LANES = ((150.0, 260.0), (270.0, 320.0), (390.0, -240.0), (510.0, -300.0))
+from .road import IMAGE, LANES, truth_of
+
+DURATION_S, NOISE_PX, FOUND = 36.0, 2.0, 0.91
 
 
 def highway(rate_hz: float, seed: int) -> tuple[Detections, GroundTruth]:
@@ -40,18 +41,10 @@ def highway(rate_hz: float, seed: int) -> tuple[Detections, GroundTruth]:
             if rng.random() < FOUND:
                 box = box + NOISE_PX * rng.standard_normal(4)
                 seen.append((t, *box, np.clip(rng.normal(0.72, 0.12), 0.05, 1.0)))
-    d, g = np.array(seen), np.array(true)
+    d = np.array(seen)
     none = np.isnan(d[:, 1])
     detections = Detections.from_rows(d[:, 0], ["rgb"] * len(d), d[:, 1:5], d[:, 5], none)
-    truth = GroundTruth(
-        t=g[:, 0],
-        object_id=g[:, 1].astype(np.int64),
-        boxes=np.ascontiguousarray(g[:, 2:]),
-        motion=None,
-        ignore=np.zeros(len(g), dtype=bool),
-        frames=times,
-    )
-    return detections, truth
+    return detections, truth_of(true, times)
 
 
 def step_by_step(detections: Detections, *overrides: str) -> Trajectories:
@@ -106,3 +99,18 @@ def test_scores_that_are_all_low_are_named_and_the_setting_that_the_line_names_h
     )
     low = replace(detections, scores=np.full(len(detections), 0.3))
     assert mota(track(low, image=IMAGE, config=load_config("default", [setting])).causal, truth) > 90.0
+
+
+def test_the_sensor_is_named_whose_scores_are_low_in_whatever_order_they_come(tmp_path, capsys):
+    """Another one scans first, and sees nothing."""
+    detections, _ = highway(10.0, 0)
+    table = detections.to_pandas()
+    table["score"] = table["score"].where(table["score"].isna(), 0.3)
+    table["sensor"] = "evt"
+    table["t"] += 0.05
+    empty = table.drop_duplicates("t").assign(sensor="rgb", left=None, top=None, width=None, height=None)
+    empty = empty.assign(score=None, t=empty["t"] - 0.05)
+    concat([empty, table]).sort_values("t").to_csv(tmp_path / "two.csv", index=False)
+    command = ["track", str(tmp_path / "two.csv"), "--image", "1280x720", "--out", str(tmp_path / "run")]
+    assert main(command) == 0
+    assert "most scores of 'evt' are below" in capsys.readouterr().err

@@ -7,9 +7,9 @@ import pytest
 
 from jeat_graph import Detections, GroundTruth, Scan, evaluate, track
 
-SECONDS, RATE_HZ, IMAGE = 30.0, 10.0, (1280, 720)
-#: Top (px) and speed (px/s) of each lane.
-LANES = ((150.0, 260.0), (270.0, 320.0), (390.0, -240.0), (510.0, -300.0))
+from .road import IMAGE, LANES, truth_of
+
+SECONDS, RATE_HZ = 30.0, 10.0
 
 
 def drawn_road(off: float, seed: int) -> tuple[Detections, GroundTruth]:
@@ -41,15 +41,7 @@ def drawn_road(off: float, seed: int) -> tuple[Detections, GroundTruth]:
         for name, boxes in (("right", jittering), ("wrong", lying)):
             scores = rng.uniform(0.5, 0.95, len(boxes))
             scans.append(Scan(float(t), name, np.array(boxes).reshape(-1, 4), scores))
-    g = np.array(truth)
-    return Detections.from_scans(scans), GroundTruth(
-        t=g[:, 0],
-        object_id=g[:, 1].astype(np.int64),
-        boxes=np.ascontiguousarray(g[:, 2:]),
-        motion=None,
-        ignore=np.zeros(len(g), dtype=bool),
-        frames=np.unique(g[:, 0]),
-    )
+    return Detections.from_scans(scans), truth_of(truth, np.unique([row[0] for row in truth]))
 
 
 @pytest.mark.parametrize("seed", range(3))

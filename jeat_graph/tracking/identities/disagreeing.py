@@ -118,7 +118,7 @@ def edited(
     others are nobody's. One that was added is a detection of a sensor that looked then.
     """
     boxes, owner, scores = detections.boxes.copy(), owner.copy(), detections.scores.copy()
-    at = np.repeat(detections.scan_t, np.diff(detections.scan_start))
+    at = detections.box_t
     instant = _instants(rows, detections)
     for row in found.moved.tolist():
         own = np.flatnonzero((owner == code[row]) & (np.abs(at - instant[row]) <= SAME_S))
@@ -194,7 +194,7 @@ def _from_detections(
     rows: CorrectedTracks, code: IntArray, detections: Detections, owner: IntArray, noise: Noise
 ) -> tuple[FloatArray, BoolArray]:
     """Return how far each row (R,) lies from the detection of its track then, and whether it has one."""
-    at = np.repeat(detections.scan_t, np.diff(detections.scan_start))
+    at = detections.box_t
     instant = _instants(rows, detections)
     off, has = np.full(len(code), np.inf), np.zeros(len(code), dtype=bool)
     scanned = np.unique(detections.scan_t)

@@ -115,9 +115,8 @@ def _where(scan: Scan, keep: BoolArray) -> Scan:
 
 def _rows(detections: Detections) -> tuple[Any, Any]:
     """Return time (N,) and sensor's name (N,) of each detection."""
-    count = np.diff(detections.scan_start)
     names = np.asarray(detections.sensors, dtype=np.str_)
-    return np.repeat(detections.scan_t, count), names[np.repeat(detections.scan_sensor, count)]
+    return detections.box_t, names[detections.box_sensor]
 
 
 def _order_of(t: Any, names: Any) -> IntArray:

@@ -44,7 +44,7 @@ def retrack(
         like: a tracker with the configuration and the constants.
         from_scratch: whether all tracks follow what was decided, as if each had changed.
     """
-    owner, t = decision.owner, np.repeat(detections.scan_t, np.diff(detections.scan_start))
+    owner, t = decision.owner, detections.box_t
     changed = np.ones(len(owner), dtype=bool) if from_scratch else changed_tracks(decision)
     above = max(int(owner.max(initial=0)), int(decision.causal.max(initial=0)))
     causal = None if from_scratch else _Along(like, above, decision.causal)

@@ -72,7 +72,7 @@ def _recording(tracker: ModelTracker, detections: Detections, camera: FloatArray
     """
     count = np.diff(detections.scan_start)
     numbers = np.array([tracker.engine_sensors.index(name) for name in detections.sensors], dtype=np.int64)
-    sensor = numbers[np.repeat(detections.scan_sensor, count)]
+    sensor = numbers[detections.box_sensor]
     boxes = np.concatenate(
         [detections.boxes[:, :2], detections.boxes[:, :2] + detections.boxes[:, 2:]], axis=1
     )
