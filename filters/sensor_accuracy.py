@@ -44,9 +44,9 @@ from jeat_graph.filters.model_constants import ModelConstants
 _TO_SIDES = np.array([2.0, 2.0, 0.5, 0.5]) / SIDES
 # Sums of `AccuracySums.aspect`: of u, u², e, e² over both times of a pair, of e e', and of (e u' + e' u) / 2.
 SUM, SUM_SQUARE, DIFFERENCE, DIFFERENCE_SQUARE, LASTING, LEANING = range(6)
-_ASPECT_SUMS = 6
 # What is the same seen from the other sensor, and what has the other sign.
 _SIGN = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])
+_ASPECT_SUMS = len(_SIGN)
 # Sweeps of the least squares; they end on two sensors in the first one, on three after some ten.
 _SWEEPS = 50
 _LEAST_SHARE = 1e-12

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from jeat_graph.data.arrays import FloatArray
 from jeat_graph.filters import (
     box_sides,
     camera_motion,
@@ -92,12 +93,22 @@ def test_survival_goes_from_the_prior_to_what_is_counted():
     assert gap_survival.survival(lost, np.array([1.5]), C)[0] < 0.1
 
 
+def _steady(number: int) -> FloatArray:
+    """Boxes that are at the same places in all scans."""
+    return np.arange(number)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+
+
+def _stray(rng: np.random.Generator, number: int) -> FloatArray:
+    """Boxes that are somewhere, in each scan somewhere else."""
+    return rng.uniform(0, 1000, (number, 1)) + np.array([[500.0, 500.0, 520.0, 520.0]])
+
+
 def test_scores_above_which_boxes_come_again_are_found():
     rng = np.random.default_rng(2)
     counts = score_calibration.no_repetition()
-    steady = np.arange(20)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+    steady = _steady(20)
     for _ in range(200):
-        stray = rng.uniform(0, 1000, (20, 1)) + np.array([[500.0, 500.0, 520.0, 520.0]])
+        stray = _stray(rng, 20)
         boxes = np.concatenate([steady, stray])
         logits = np.concatenate([rng.normal(3.0, 0.3, 20), rng.normal(-1.0, 0.3, 20)])
         counts = score_calibration.count_repetition(counts, boxes, logits, C)
@@ -110,7 +121,7 @@ def test_scores_above_which_boxes_come_again_are_found():
 def test_boxes_are_counted_once_each_about_their_logits():
     """A Gaussian kernel keeps number and mean, and adds its own variance."""
     counts, scans = score_calibration.no_repetition(), 10
-    boxes = np.arange(3)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+    boxes = _steady(3)
     logits = np.array([-1.3, 0.45, 2.0])
     for _ in range(scans):
         counts = score_calibration.count_repetition(counts, boxes, logits, C)
@@ -129,7 +140,7 @@ def _repeated(
     """Things that stand, whose logits have this share of their variance in common from scan to scan."""
     rng = np.random.default_rng(seed)
     counts = score_calibration.no_repetition()
-    boxes = np.arange(things)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+    boxes = _steady(things)
     own = rng.normal(0.0, np.sqrt(persistent), things)
     for _ in range(scans):
         logits = 1.0 + std * (own + rng.normal(0.0, np.sqrt(1.0 - persistent), things))
@@ -152,9 +163,9 @@ def test_scores_that_are_better_where_boxes_come_again_have_a_meaning():
     """Those of real things differ by chance alone; what is false does not come again."""
     rng = np.random.default_rng(4)
     counts = score_calibration.no_repetition()
-    steady = np.arange(10)[:, None] * 50.0 + np.array([[0.0, 0.0, 30.0, 30.0]])
+    steady = _steady(10)
     for _ in range(100):
-        stray = rng.uniform(0, 1000, (5, 1)) + np.array([[500.0, 500.0, 520.0, 520.0]])
+        stray = _stray(rng, 5)
         logits = np.concatenate([rng.normal(1.5, 1.5, 10), rng.normal(0.0, 1.5, 5)])
         counts = score_calibration.count_repetition(counts, np.concatenate([steady, stray]), logits, C)
     assert score_calibration.meaning(counts, C) > 0.99

@@ -20,6 +20,9 @@ inline constexpr std::size_t kCompared = 5;  // differences of two sensors (4), 
 enum AspectSum : std::size_t { kSum, kSumSquare, kDifference, kDifferenceSquare, kLasting, kLeaning, kAspectSums };
 using Compared = std::array<double, kCompared>;
 
+// Whether a sum has the other sign seen from the other sensor.
+inline bool changes_sign(std::size_t sum) { return sum == kDifference || sum == kLeaning; }
+
 struct AccuracySums {
     std::vector<double> pairs, product;  // (S, S)
     std::vector<double> aspect;          // (S, S, kAspectSums), row less column
@@ -51,10 +54,8 @@ struct AccuracySums {
         for (const std::size_t one : {at, back}) {
             pairs[one] += 1.0;
             product[one] += of_pair;
-            for (std::size_t k = 0; k < kAspectSums; ++k) {
-                const bool turns = one == back && (k == kDifference || k == kLeaning);
-                aspect[one * kAspectSums + k] += turns ? -new_sums[k] : new_sums[k];
-            }
+            for (std::size_t k = 0; k < kAspectSums; ++k)
+                aspect[one * kAspectSums + k] += one == back && changes_sign(k) ? -new_sums[k] : new_sums[k];
         }
     }
 

@@ -62,7 +62,10 @@ template <int N> std::array<double, N * N> short_exponential(const std::array<do
 inline int halvings(double dt, double fastest) {
     int n = 0;
     double h = dt * fastest;
-    while (h > 0.1) h /= 2.0, ++n;
+    while (h > 0.1) {
+        h /= 2.0;
+        ++n;
+    }
     return n;
 }
 

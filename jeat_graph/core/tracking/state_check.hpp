@@ -110,8 +110,7 @@ inline void check_accuracy(const AccuracySums& sums) {
                     "is of no boxes");
             for (std::size_t k = 0; k < kAspectSums; ++k) {
                 const double one = sums.aspect[at * kAspectSums + k], other = sums.aspect[back * kAspectSums + k];
-                const bool turns = k == kDifference || k == kLeaning;
-                require(one == (turns ? -other : other), "accuracy.aspect", "is not the same both ways");
+                require(one == (changes_sign(k) ? -other : other), "accuracy.aspect", "is not the same both ways");
                 require(std::abs(one) <= square(kMostLogSize) * (sums.pairs[at] + 1.0), "accuracy.aspect",
                         "is of no boxes");
             }
