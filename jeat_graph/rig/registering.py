@@ -2,7 +2,8 @@
 
 1. Each sensor's own tracks (`sensor_tracks`). 2. The clocks, roughly, by how vehicles grow (`clock_search`).
 3. Which vehicle is which, by RANSAC over pairs of trajectories (`matching`). 4. Map, clock and all paths in
-one factor graph (`refining`). 5. Does the traffic tell it? Where it does not, nothing is returned.
+one factor graph (`refining`). 5. Does the traffic tell it? Where it does not, nothing is returned; cameras
+that face each other are recognised (`passing`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from jeat_graph.data.picture_map import LENSES, PictureMap
 from jeat_graph.rig.between_vehicles import LensEvidence
 from jeat_graph.rig.clock_search import offset_of, rank_offsets
 from jeat_graph.rig.matching import MatchedTracks, match_again, match_at, no_tracks
+from jeat_graph.rig.passing import facing_pattern
 from jeat_graph.rig.refining import Refined, no_smaller, refine, with_lenses
 from jeat_graph.rig.sensor_tracks import SensorTracks, joined
 
@@ -82,6 +84,28 @@ def register_by_traffic(
                 f"sensor {name!r} saw {moving} vehicles drive by, and {LEAST_VEHICLES} are needed: "
                 "record longer"
             )
+    try:
+        return _register(first, second, names, sizes, start)
+    except DataError:
+        facing = facing_pattern(first, second)
+        if facing is None:
+            raise
+        raise DataError(
+            f"sensors {names[0]!r} and {names[1]!r} face each other (the clock of {names[1]!r} is ahead by "
+            f"about {facing.offset_s:.1f} s): vehicles that grow in one picture shrink in the other, in the "
+            "same order. Such pictures are not registered: run `track` and `road` on each; `handover` "
+            "follows vehicles from one to the other"
+        ) from None
+
+
+def _register(
+    first: SensorTracks,
+    second: SensorTracks,
+    names: tuple[str, str],
+    sizes: tuple[tuple[float, float], tuple[float, float]],
+    start: MatchedTracks | None,
+) -> Registration:
+    """Bring together two sensors that look the same way."""
     matched = _best(first, second, names) if start is None else match_again(first, second, start)
     _check_matches(matched, names)
 
@@ -214,8 +238,7 @@ def _check_matches(matched: MatchedTracks, names: tuple[str, str]) -> None:
         raise _undetermined(
             names,
             f"at best {count} of {possible} vehicles have a partner: they look at different roads, or did "
-            "not record at one time, or face each other (that is not registered; `handover` follows vehicles "
-            "from one to the other)",
+            "not record at one time, or face each other and share little of the road",
         )
     if matched.wrong_map > _MOST_SECOND * count:
         raise _undetermined(

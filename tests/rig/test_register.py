@@ -110,6 +110,20 @@ def test_traffic_that_does_not_tell_is_refused_and_no_file_is_written(
     assert out.read_text() == "was here\n"
 
 
+def test_cameras_that_face_each_other_are_said_to_and_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recorded = Recorded(tmp_path, 102, "facing")
+    out = tmp_path / "rig.yaml"
+    assert main(["register", *recorded.files, *recorded.sizes, "--out", str(out)]) == 2
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert "sensors 'rgb' and 'evt' face each other" in line
+    assert "`handover` follows vehicles" in line
+    said = float(line.partition("ahead by about ")[2].partition(" s)")[0])
+    assert said == pytest.approx(true_offset(recorded.scene, 50.0), abs=0.5)
+    assert not out.exists()
+
+
 def test_vehicles_that_grow_alike_tell_the_clocks_difference_without_any_picture(road: Recorded) -> None:
     first, second = road.tracks()
     best, other = rank_offsets(first, second, 2)
