@@ -25,7 +25,7 @@ from jeat_graph_sehn.simulation.sensors.detector import SensorModel
 from jeat_graph_sehn.simulation.sensors.noise import NoiseModel
 from jeat_graph_sehn.simulation.sensors.timing import TimingConfig
 from jeat_graph_sehn.simulation.simulate import record
-from jeat_graph_sehn.simulation.world.camera import Camera, CameraConfig
+from jeat_graph_sehn.simulation.world.camera import Camera, CameraConfig, turned
 from jeat_graph_sehn.simulation.world.rig import Rig, draw_rig
 from jeat_graph_sehn.simulation.world.road import RoadConfig
 from jeat_graph_sehn.simulation.world.scene import Scene
@@ -46,6 +46,10 @@ _BENT = (-0.12, -0.02)
 # How far along the road the camera stands that looks back (m), and for how long views are together that are
 # too short (s).
 _FACING_M, _SHORT_S = (50.0, 100.0), (5.0, 14.0)
+# A view of a short stretch, from any side: how far away its middle is and how wide it is there (m), at which
+# angle it is looked down on, and where it lies (m). Traffic is slower, or vehicles were gone at once.
+_STRETCH_FAR_M, _STRETCH_WIDE_M, _STRETCH_DOWN_DEG = (35.0, 60.0), (15.0, 40.0), (15.0, 45.0)
+_STRETCH_AT_M, _STRETCH_SPEED = 50.0, (0.3, 0.6)
 _HELD_BACK = 991  # seed of the vehicles by which a registration is judged
 
 
@@ -86,13 +90,18 @@ def draw_scene(seed: int, kind: str = "road") -> RigScene:
         seed: another seed, another rig.
         kind: `road`; `bent`, both lenses have a barrel distortion; `facing`, the second camera stands along
             the road and looks back; `short`, the cameras see the road together for a few seconds only;
-            `lane`, all vehicles in one lane; or `apart`, where the cameras look at other roads.
+            `stretch`, they see a short stretch of it, on which sizes hardly change; `lane`, all vehicles in
+            one lane; or `apart`, where the cameras look at other roads.
     """
     rng = np.random.default_rng(seed)
     scenario = _scenario(rng, kind == "lane")
+    camera = Camera.mounted(scenario.camera)
+    if kind == "stretch":
+        camera = _over_a_stretch(camera, rng)
+        slower = replace(scenario.traffic, speed_factor=float(rng.uniform(*_STRETCH_SPEED)))
+        scenario = replace(scenario, traffic=slower)
     late = float(rng.uniform(-_MOST_LATE_S, _MOST_LATE_S))
-    drawn = replace(draw_rig(rng, Camera.mounted(scenario.camera)), late_s=late)
-    rig = Rig.beside(Camera.mounted(scenario.camera), drawn)
+    rig = Rig.beside(camera, replace(draw_rig(rng, camera), late_s=late))
     if kind == "bent":
         rig = replace(rig, common=_bent(rig.common, rng), own=_bent(rig.own, rng))
     if kind == "facing":
@@ -113,6 +122,15 @@ def _bent(camera: Camera, rng: np.random.Generator) -> Camera:
     corner = np.hypot(0.5 * camera.width / camera.fx, 0.5 * camera.height / camera.fy)
     k1 = float(rng.uniform(*_BENT) / corner**2)
     return Lens(LensConfig(k1=k1), camera, rng).camera_at(0.0)
+
+
+def _over_a_stretch(camera: Camera, rng: np.random.Generator) -> Camera:
+    """Put a camera far from a short stretch of road, with a lens that sees no more than that."""
+    far = float(rng.uniform(*_STRETCH_FAR_M))
+    focal = camera.width * far / float(rng.uniform(*_STRETCH_WIDE_M))
+    rotation = turned(float(rng.uniform(*_STRETCH_DOWN_DEG)), float(rng.uniform(-180.0, 180.0)), 0.0)
+    position = np.array([0.0, _STRETCH_AT_M, 0.0]) - far * rotation[2]
+    return replace(camera, fx=focal, fy=focal, position=position, rotation=rotation)
 
 
 def _looking_back(camera: Camera, rng: np.random.Generator) -> Camera:

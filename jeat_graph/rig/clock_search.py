@@ -15,8 +15,11 @@ import numpy as np
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.rig.sensor_tracks import STEP_S, SensorTracks
 
-# Sizes are compared at every so many steps; differences of clocks are tried at every so many.
-_STRIDE, _OFFSET_STEPS = 4, 2
+# Sizes are compared at every so many steps, at least and at most: the usual track at so many times. At every
+# .4 s, vehicles that are seen for 1 to 2 s would have too few times in common.
+_LEAST_STRIDE, _MOST_STRIDE, _USUAL_TIMES = 2, 4, 8
+# Differences of clocks are tried at every so many steps.
+_OFFSET_STEPS = 2
 # A pair is compared at so many times at least, and goes along where the difference of its logarithms varies
 # by no more than this.
 _LEAST_TIMES, _GOES_ALONG = 4, 0.13
@@ -48,6 +51,20 @@ class TrackPairs(NamedTuple):
     log_ratio: FloatArray
 
 
+class _Sizes(NamedTuple):
+    """What is compared of both sensors.
+
+    Attributes:
+        logs: (N, T) logarithms of the sizes at each step.
+        there: (T, P) which tracks are there at each step.
+        stride: steps from one comparison to the next.
+    """
+
+    logs: tuple[FloatArray, FloatArray]
+    there: tuple[IntArray, IntArray]
+    stride: int
+
+
 class OffsetCandidate(NamedTuple):
     """A difference of the clocks that may be the right one.
 
@@ -69,9 +86,8 @@ def rank_offsets(first: SensorTracks, second: SensorTracks, count: int) -> list[
     """Try all differences of the clocks, and return the best ones, the best first."""
     least = round(LEAST_OVERLAP_S / STEP_S)
     shifts = np.arange(least - first.steps, second.steps - least + 1, _OFFSET_STEPS)
-    there = first.present(), second.present()
-    logs = _log_size(first), _log_size(second)
-    found = [OffsetCandidate(int(shift), _score(logs, there, int(shift))) for shift in shifts]
+    sizes = _sizes(first, second)
+    found = [OffsetCandidate(int(shift), _score(sizes, int(shift))) for shift in shifts]
     found.sort(key=lambda one: -one.score)
     kept: list[OffsetCandidate] = []
     for one in found:
@@ -84,8 +100,7 @@ def rank_offsets(first: SensorTracks, second: SensorTracks, count: int) -> list[
 
 def pairs_at(first: SensorTracks, second: SensorTracks, shift: int) -> TrackPairs:
     """Return the pairs whose sizes go along at a shift, all with about one ratio."""
-    logs = _log_size(first), _log_size(second)
-    code, difference, step_a = _compared(logs, (first.present(), second.present()), shift)
+    code, difference, step_a = _compared(_sizes(first, second), shift)
     number = len(second)
     codes, inverse = np.unique(code, return_inverse=True)
     good, mean = _along(inverse, difference, len(codes))
@@ -105,18 +120,31 @@ def pairs_at(first: SensorTracks, second: SensorTracks, shift: int) -> TrackPair
     )
 
 
+def _sizes(first: SensorTracks, second: SensorTracks) -> _Sizes:
+    both = first, second
+    usual = min(
+        (
+            float(np.median(np.isfinite(one.centre[one.moves.astype(bool), :, 0]).sum(axis=1)))
+            for one in both
+            if one.moves.any()
+        ),
+        default=0.0,
+    )
+    stride = int(np.clip(usual // _USUAL_TIMES, _LEAST_STRIDE, _MOST_STRIDE))
+    return _Sizes((_log_size(first), _log_size(second)), (first.present(), second.present()), stride)
+
+
 def _log_size(tracks: SensorTracks) -> FloatArray:
     with np.errstate(invalid="ignore"):
         return np.asarray(0.5 * np.log(tracks.size.prod(axis=2)))
 
 
-def _compared(
-    logs: tuple[FloatArray, FloatArray], there: tuple[IntArray, IntArray], shift: int
-) -> tuple[IntArray, FloatArray, IntArray]:
+def _compared(sizes: _Sizes, shift: int) -> tuple[IntArray, FloatArray, IntArray]:
     """Every pair of tracks at every common time: its code (K,), their difference, step of the first."""
+    logs, there = sizes.logs, sizes.there
     begin = max(0, -shift)
     end = min(logs[0].shape[1], logs[1].shape[1] - shift)
-    steps = np.arange(begin, max(end, begin), _STRIDE)
+    steps = np.arange(begin, max(end, begin), sizes.stride)
     a, b = there[0][steps][:, :, None], there[1][steps + shift][:, None, :]
     both = (a >= 0) & (b >= 0)
     when, i, j = np.nonzero(both)
@@ -146,8 +174,8 @@ def _usual(values: FloatArray) -> float:
     return float(np.median(near)) if len(near) else middle
 
 
-def _score(logs: tuple[FloatArray, FloatArray], there: tuple[IntArray, IntArray], shift: int) -> float:
-    code, difference, _ = _compared(logs, there, shift)
+def _score(sizes: _Sizes, shift: int) -> float:
+    code, difference, _ = _compared(sizes, shift)
     if not len(code):
         return 0.0
     codes, inverse = np.unique(code, return_inverse=True)
@@ -156,7 +184,7 @@ def _score(logs: tuple[FloatArray, FloatArray], there: tuple[IntArray, IntArray]
         return 0.0
     good &= np.abs(mean - _usual(mean[good])) < _ONE_RATIO
     times = np.bincount(inverse)
-    number = logs[1].shape[0]
+    number = len(sizes.logs[1])
     shares = []
     for whose in (codes // number, codes % number):
         best = np.zeros(int(whose.max()) + 1)

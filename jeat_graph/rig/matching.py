@@ -40,7 +40,7 @@ class MatchedTracks(NamedTuple):
         way: from the second's picture to the first's.
         offset_s: what the second's clock is ahead (s).
         possible: tracks of each sensor that a partner could be found for, as the other looked there.
-        wrong_map: most matches that a map had which is quite another.
+        wrong_map: most matches with other partners that a map had which is quite another.
     """
 
     a: IntArray

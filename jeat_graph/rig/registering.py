@@ -216,7 +216,11 @@ def _offset_of_matches(
 
 
 def _best(first: SensorTracks, second: SensorTracks, names: tuple[str, str]) -> MatchedTracks:
-    """Match at the likeliest differences of the clocks; the best one must be far better than the others."""
+    """Match at the likeliest differences of the clocks; the best one must be far better than the others.
+
+    On a short stretch of road a late clock looks like a map that is shifted along it. What matches the same
+    partners at another difference is therefore no other solution: the graph finds the clock.
+    """
     found = [
         one
         for candidate in rank_offsets(first, second, _CANDIDATES)
@@ -228,8 +232,14 @@ def _best(first: SensorTracks, second: SensorTracks, names: tuple[str, str]) -> 
         )
     found.sort(key=lambda one: -len(one.a))
     best = found[0]
-    others = [len(one.a) for one in found[1:] if abs(one.offset_s - best.offset_s) > _OTHER_S]
+    others = [
+        len(_pairs(one) - _pairs(best)) for one in found[1:] if abs(one.offset_s - best.offset_s) > _OTHER_S
+    ]
     return best._replace(wrong_map=max(others, default=0))
+
+
+def _pairs(matched: MatchedTracks) -> set[tuple[int, int]]:
+    return set(zip(matched.a.tolist(), matched.b.tolist(), strict=True))
 
 
 def _check_matches(matched: MatchedTracks, names: tuple[str, str]) -> None:
@@ -244,7 +254,7 @@ def _check_matches(matched: MatchedTracks, names: tuple[str, str]) -> None:
         raise _undetermined(
             names,
             f"{count} vehicles have a partner at {matched.offset_s:.2f} s between the clocks, and "
-            f"{matched.wrong_map} at quite another difference: record longer",
+            f"{matched.wrong_map} another one at quite another difference: record longer",
         )
 
 

@@ -124,6 +124,20 @@ def test_cameras_that_face_each_other_are_said_to_and_refused(
     assert not out.exists()
 
 
+def test_cameras_over_a_short_stretch_are_brought_together_to_what_is_said(tmp_path: Path) -> None:
+    # Vehicles are wholly in view for 2 s, and match at clocks half a second apart.
+    recorded = Recorded(tmp_path, 600, "stretch")
+    out = tmp_path / "rig.yaml"
+    assert main(["register", *recorded.files, *recorded.sizes, "--out", str(out)]) == 0
+    config = load_config(rig=out)
+    way, clock = CommonPicture.of(config).ways["evt"].picture, config.sensors["evt"].clock
+    assert way is not None
+    assert clock is not None
+    assert abs(clock.offset_s - true_offset(recorded.scene, clock.at_s)) < 3.0 * clock.offset_std_s < 0.06
+    errors = np.concatenate(list(judge(recorded.scene, way).values()))
+    assert np.sqrt(np.mean(errors**2)) < way.std_px(recorded.scene.sizes[1])
+
+
 def test_vehicles_that_grow_alike_tell_the_clocks_difference_without_any_picture(road: Recorded) -> None:
     first, second = road.tracks()
     best, other = rank_offsets(first, second, 2)
