@@ -4,7 +4,7 @@ Where a vehicle stands there are no events. What is remembered of it then lasts,
 more events come than noise makes: nothing is learned there, and nothing is forgotten. Where it is open, each
 channel forgets with a time constant of its own, which is learnt: after Δt of any length a share exp(-gΔt/τ)
 is left, g how far the gate is open. What creeps shows in the sum of some seconds: of each polarity there are
-leaky averages of the rate of events, in units of what most of the picture has: noise.
+leaky averages of the rate of events, in units of what most of their row of the picture has: noise.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class SinceThen(NamedTuple):
     Attributes:
         elapsed_s: (L x B,) time since the window before each (s); at the first that of the window itself.
         rates: (L x B, 6, H/4, W/4) leaky averages of events (1/s).
-        noise: (L x B, 6, 1, 1) of these what most of the picture has.
+        noise: (L x B, 6, H/4, 1) of these what most of each row has.
     """
 
     elapsed_s: Tensor
@@ -66,7 +66,9 @@ class Traces(nn.Module):
 
     s' = e s + (1 - e) r with e = exp(-Δt/τ) and r the rate in the last Δt; a weight w follows likewise the
     number 1, so s/w is right from the first window on. The feature is log((s/w + ε) / (n + ε)), where n is
-    the geometric mean over the picture of the slowest average: few cells have vehicles, so it is the noise.
+    the geometric mean over the row of the slowest average: few of its cells have vehicles, so it is noise.
+    A sky has another than a road, the far end of it another than the near one, and all the more at night: a
+    mean over the picture takes the noise of a tenth to a third of it for more than noise.
 
     Args:
         settings: bins of the windows, and width.
@@ -117,8 +119,7 @@ class Traces(nn.Module):
             found.append(state)
         together = torch.cat(found) if length > 1 else state
         averages = together[:, :FEATURES] / together[:, FEATURES:]
-        logs = torch.log(averages[:, FEATURES - 2 :] + _LEAST_HZ)
-        noise = torch.exp(logs.mean(dim=(2, 3), keepdim=True)) - _LEAST_HZ
+        noise = _noise_by_row(averages[:, FEATURES - 2 :])
         return SinceThen(elapsed_s, averages, torch.cat([noise] * len(SPANS_S), dim=1)), state
 
     def forward(self, passed: SinceThen) -> Tensor:
@@ -126,6 +127,16 @@ class Traces(nn.Module):
         activity = torch.log((passed.rates + _LEAST_HZ) / (passed.noise + _LEAST_HZ))
         added: Tensor = self.carry(torch.relu(self.see(activity)))
         return added
+
+
+def _noise_by_row(rates: Tensor) -> Tensor:
+    """Return the geometric mean over each row (N, 2, H, 1) of rates (N, 2, H, W) of events (1/s).
+
+    Columns without a single event are beside the camera's picture, where its shape is not the input's.
+    """
+    seen = (rates.amax(dim=(1, 2), keepdim=True) > 0.0).to(rates.dtype)
+    logs = (torch.log(rates + _LEAST_HZ) * seen).sum(dim=3, keepdim=True)
+    return torch.exp(logs / torch.clamp(seen.sum(dim=3, keepdim=True), min=1.0)) - _LEAST_HZ
 
 
 class Lasting(nn.Module):
@@ -181,7 +192,8 @@ class Lasting(nn.Module):
         """
         nearby = nn.functional.avg_pool2d(passed.rates, self._times)
         nearby = nn.functional.avg_pool2d(nearby, _NEARBY, 1, _NEARBY // 2, count_include_pad=False)
-        came, expected = (torch.sqrt(one * self.counts + _ADDED) for one in (nearby, passed.noise))
+        noise = nn.functional.avg_pool2d(passed.noise, (self._times, 1))
+        came, expected = (torch.sqrt(one * self.counts + _ADDED) for one in (nearby, noise))
         above = (2.0 / _DEVIATIONS) * (came - expected)
         return torch.sigmoid(self.open(torch.clamp(above, -_MOST_TIMES, _MOST_TIMES)))
 

@@ -95,11 +95,26 @@ def test_what_is_added_goes_by_the_noise(times):
     assert added(1.0)[0, :, 0, 0].abs().max() > 0.1
 
 
+def test_each_row_has_its_own_noise_and_columns_beside_the_picture_are_no_part_of_it():
+    """A sky of 3 Hz over a road of 20, in the left half of the input; a vehicle's one cell is hardly seen."""
+    counts = torch.zeros(1, 20, SIDE[1], SIDE[0])
+    counts[:, :, :16, :24] = 3.0 * BIN_S
+    counts[:, :, 16:, :24] = 20.0 * BIN_S
+    counts[:, :, 20:24, 4:8] *= 30.0
+    state = torch.zeros(1, TRACE_CHANNELS, SIDE[1] // 4, SIDE[0] // 4)
+    passed, _ = Traces(NET, 8).follow(counts, state, 1, torch.tensor([0.05]))
+    expected = 16.0 * torch.tensor([3.0] * 4 + [20.0] * 4)
+    row = 5
+    expected[row] *= 30.0 ** (1 / 6)
+    assert passed.noise.shape == (1, 6, 8, 1)
+    torch.testing.assert_close(passed.noise[0, :, :, 0], expected.expand(6, 8), rtol=0.01, atol=0.0)
+
+
 def coming(hz, noise_hz, side=(20, 8)):
     """Return what a memory gets where so many events a second come in one cell, and noise elsewhere."""
     rates = torch.full((1, 6, side[1], side[0]), noise_hz)
     rates[:, :, 2, 3] = hz
-    return SinceThen(torch.tensor([0.05]), rates, torch.full((1, 6, 1, 1), noise_hz))
+    return SinceThen(torch.tensor([0.05]), rates, torch.full((1, 6, side[1], 1), noise_hz))
 
 
 def test_a_state_lasts_by_time_and_not_by_windows():
@@ -152,7 +167,7 @@ def test_a_gate_that_is_closed_leaves_a_state_as_it_was():
     memory, lasting = ConvGru(4), Lasting(4, 8, 0.9)
     with torch.no_grad():
         lasting.open.bias.fill_(-50.0)
-    state, noise = torch.rand(1, 4, 4, 6), torch.zeros(3, 6, 1, 1)
+    state, noise = torch.rand(1, 4, 4, 6), torch.zeros(3, 6, 8, 1)
     passed = SinceThen(torch.full((3,), 0.05), torch.zeros(3, 6, 8, 12), noise)
     with torch.no_grad():
         _, last = remembered_by_time(memory, lasting, torch.rand(3, 4, 4, 6), state, 3, passed)
