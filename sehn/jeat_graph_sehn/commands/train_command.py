@@ -163,16 +163,21 @@ def _request(args: argparse.Namespace) -> TrainRequest:
         ConfigError: settings that are not valid.
     """
     from jeat_graph.config.section_tree import build, tree_of_changes
+    from jeat_graph_sehn.training.making import settings_of
     from jeat_graph_sehn.training.procedure import TrainRequest
-    from jeat_graph_sehn.training.settings import WIDTHS, NetSettings, TrainSettings
+    from jeat_graph_sehn.training.settings import BY_TIME, WIDTHS, NetSettings, TrainSettings
 
     out = Path(args.out)
     if out.suffix.lower() != ".onnx":
         raise ConfigError(f"--out: {args.out} must end in .onnx")
     tree = tree_of_changes(args.overrides)
+    start = _start(args.kind, args.start)
     net = {"kind": args.kind, "width": WIDTHS[args.net]}
     if isinstance(tree.get("net"), dict):
         net = tree.pop("net") | net
+    # Who goes on with a network that remembers by time has no other choice.
+    if any(settings_of(path).by_time for path in start):
+        net = {"memory": BY_TIME} | net
     given = {
         "crop_px": args.crop and list(args.crop),
         "batch": args.batch,
@@ -190,7 +195,7 @@ def _request(args: argparse.Namespace) -> TrainRequest:
         pictures=Path(args.pictures) if args.pictures else None,
         side=args.size,
         device=args.device,
-        start=_start(args.kind, args.start),
+        start=start,
         force=args.force,
     )
 

@@ -43,7 +43,7 @@ class Backbone(nn.Module):
 
     Args:
         channels: of the input.
-        settings: width, and the share of the memory that is left at the next window.
+        settings: width, and how its memory lasts.
         has_memory: whether it remembers windows before, at the two coarser strides.
 
     Attributes:
@@ -64,7 +64,7 @@ class Backbone(nn.Module):
         self.traces: Traces | None = None
         self.lasting = nn.ModuleList()
         if has_memory and settings.by_time:
-            self.lasting.extend(Lasting(*state, settings.memory_keep) for state in self.states)
+            self.lasting.extend(Lasting(*state) for state in self.states)
             self.traces = Traces(settings, fine)
             self.states = (*self.states, (TRACE_CHANNELS, CELL_PX))
 

@@ -39,6 +39,8 @@ _WINDOWS, _EACH = 12, 4
 #: What becomes 8-bit numbers. The last convolutions and what is behind them are no part of it.
 _LAYERS = ["Conv", "Relu", "Add", "Concat", "Resize"]
 _BOXES = "boxes"
+#: In the names of the layers that add up the counts of cells.
+_SUMS = "/sums/"
 _US = 1e6
 _Feed = dict[str, npt.NDArray[Any]]
 
@@ -103,6 +105,8 @@ def write_int8(source: Path, members: Sequence[Picture | EventSegment], about: o
             extra_options=_counts_as_they_are(model) if settings.kind == EVENTS else {},
         )
         model = onnx.load(str(small))
+    if settings.by_time:
+        _sum_unrounded(model)
     if settings.kind == EVENTS:
         _take_counts(model)
     share_weights(model)
@@ -206,13 +210,41 @@ def _behind_rows(model: Any) -> list[str]:
 
 
 def _of_states(model: Any) -> list[str]:
-    """Return the names of the sums that states come of.
+    """Return the names of the sums that states come of, and of those that say what is noise.
 
-    Rounded to 8 bits they would never be forgotten: what a number loses at a window is below half a step.
+    Rounded to 8 bits they would never be forgotten: what a number loses at a window is below half a step. And
+    noise is far less than what the nearest vehicle makes.
     """
-    scopes = ("/traces/", "/memory.")
-    nodes = model.graph.node
-    return [n.name for n in nodes if n.op_type in ("Add", "Concat") and any(s in n.name for s in scopes)]
+    scopes = ("backbone", "traces", "memory")
+    sums = [node.name for node in model.graph.node if node.op_type in ("Add", "Concat")]
+    return [name for name in sums if name.split("/")[-2].startswith(scopes)]
+
+
+def _sum_unrounded(model: Any) -> None:
+    """Let states be given, and summed, as they are: not as the layers beside their sums have rounded them."""
+    graph = model.graph
+    made = {name: node for node in graph.node for name in node.output}
+
+    def whole(name: str) -> str | None:
+        """Return what a rounded number was before; None of what is none, or comes of a layer of 8 bits."""
+        back = made.get(name)
+        if back is None or back.op_type != "DequantizeLinear" or back.input[0] not in made:
+            return None
+        before = str(made[back.input[0]].input[0])
+        return before if before in made and before not in layers else None
+
+    sums = set(_of_states(model))
+    layers = {n.output[0] for n in graph.node if n.op_type in _LAYERS and n.name not in sums}
+    for node in graph.node:
+        if node.name in sums:
+            node.input[:] = [whole(name) or name for name in node.input]
+    renamed = dict[str, str]()
+    for port in graph.output:
+        if before := whole(port.name):
+            renamed |= {before: port.name, port.name: f"{port.name}_rounded"}
+    for node in graph.node:
+        node.input[:] = [renamed.get(name, name) for name in node.input]
+        node.output[:] = [renamed.get(name, name) for name in node.output]
 
 
 def _cut_offs(model: Any) -> list[Any]:
@@ -227,9 +259,14 @@ def _cut_offs(model: Any) -> list[Any]:
 
 
 def _counts_as_they_are(model: Any) -> dict[str, Any]:
-    """Ask for counts as 8-bit numbers of scale 1: they are whole and few."""
+    """Ask for counts, and their sums of a cell, as 8-bit numbers of scale 1: they are whole, and few.
+
+    At most 8 events of each of 16 pixels make 128.
+    """
     unscaled = {"scale": np.array(1.0, dtype=np.float32), "zero_point": np.array(0, dtype=np.uint8)}
-    return {"TensorQuantOverrides": {limit.output[0]: [dict(unscaled)] for limit in _cut_offs(model)}}
+    sums = [node for node in model.graph.node if node.op_type == "Conv" and _SUMS in node.name]
+    whole = [node.output[0] for node in (*_cut_offs(model), *sums)]
+    return {"TensorQuantOverrides": {name: [dict(unscaled)] for name in whole}}
 
 
 def _take_counts(model: Any) -> None:

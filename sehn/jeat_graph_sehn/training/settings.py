@@ -32,8 +32,8 @@ class NetSettings(Section):
     memory_keep: float = number(
         0.8,
         "1",
-        "share of a memory that is left at the next window: what learned from short sequences would drift "
-        "in long ones",
+        "share of a memory by windows that is left at the next one: what learned from short sequences would "
+        "drift in long ones",
         0.0,
         1.0,
     )

@@ -84,6 +84,35 @@ def test_what_learned_nothing_is_not_written_unless_it_is_forced(tmp_path, capsy
     assert sorted(path.name for path in out.parent.iterdir()) == ["n.csv", "n.onnx", "n.png"]
 
 
+@pytest.mark.parametrize(
+    ("of", "more", "memory"),
+    [
+        ("time", [], "time"),
+        ("windows", [], "windows"),
+        ("windows", ["--set", "net.memory=time"], "time"),
+        ("time", ["--set", "net.memory=windows"], "windows"),
+    ],
+)
+def test_what_goes_on_with_a_network_by_time_goes_by_time(tmp_path, monkeypatch, of, more, memory):
+    """Unless it is told otherwise, which is refused later, in words of its own."""
+    pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
+    from jeat_graph_sehn.training.export import write_onnx
+    from jeat_graph_sehn.training.network import DetectionNet
+    from jeat_graph_sehn.training.procedure import Trained
+    from jeat_graph_sehn.training.settings import NetSettings
+
+    asked = []
+    monkeypatch.setattr(
+        "jeat_graph_sehn.training.procedure.train",
+        lambda request, *_: asked.append(request) or Trained((request.out,), {}),
+    )
+    card = {"net": {"kind": "events", "width": 2, "memory": of}}
+    start, out = tmp_path / "start.onnx", tmp_path / "n.onnx"
+    write_onnx(DetectionNet(NetSettings(**card["net"])).eval(), (32, 32), card, start)
+    assert main(["train", "events", str(tmp_path), "--start", str(start), "--out", str(out), *more]) == 0
+    assert asked[0].net.memory == memory
+
+
 @pytest.mark.slow
 def test_a_training_from_the_command_line(tmp_path, capsys):
     pytest.importorskip("torch", reason="training needs PyTorch, the extra `train`")
