@@ -7,7 +7,9 @@ import pytest
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.rig.clock_search import offset_of, pairs_at, rank_offsets
-from jeat_graph.rig.sensor_tracks import STEP_S, SensorTracks, TrackMeasurements
+from jeat_graph.rig.sensor_tracks import STEP_S, SensorTracks
+
+from .drawn_tracks import moving_tracks
 
 _SECONDS, _VEHICLES, _OFFSET_S, _RATIO = 60.0, 60, 7.4, 1.5
 SEEDS = range(2)
@@ -18,14 +20,8 @@ def seen(begin: FloatArray, size: FloatArray, lasts_s: float, clock: float) -> S
     t = np.arange(0.0, _SECONDS, STEP_S)
     since = t - begin[:, None]
     x = np.where((since >= 0.0) & (since < lasts_s), 200.0 * since, np.nan)
-    none = TrackMeasurements(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)))
-    return SensorTracks(
-        clock,
-        np.stack([x, 0.0 * x], axis=2),
-        np.repeat((size[:, None] + 0.0 * x)[:, :, None], 2, axis=2),
-        [none] * len(begin),
-        np.ones(len(begin)),
-    )
+    sides = np.repeat((size[:, None] + 0.0 * x)[:, :, None], 2, axis=2)
+    return moving_tracks(clock, np.stack([x, 0.0 * x], axis=2), sides)
 
 
 def two_views(seed: int, lasts_s: float) -> tuple[SensorTracks, SensorTracks]:

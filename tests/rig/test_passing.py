@@ -9,7 +9,9 @@ import pytest
 
 from jeat_graph.data.arrays import FloatArray
 from jeat_graph.rig.passing import facing_pattern
-from jeat_graph.rig.sensor_tracks import STEP_S, SensorTracks, TrackMeasurements
+from jeat_graph.rig.sensor_tracks import STEP_S, SensorTracks
+
+from .drawn_tracks import moving_tracks
 
 _FOCAL_PX, _HEIGHT_M, _NEAR_M, _FAR_M = 800.0, 8.0, 12.0, 110.0
 _SECONDS, _APART_M, _OFFSET_S = 90.0, 80.0, -12.3
@@ -48,14 +50,8 @@ def seen(vehicles: Traffic, place: float, looks: float, clock: float, grows: boo
     foot = (
         _FOCAL_PX / depth[:, :, None] * np.stack([looks * across + 0.0 * depth, _HEIGHT_M + 0.0 * depth], 2)
     )
-    none = TrackMeasurements(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)))
-    return SensorTracks(
-        clock,
-        foot - 0.5 * size[:, :, None] * [0.0, 1.0],
-        np.repeat(size[:, :, None], 2, axis=2),
-        [none] * len(depth),
-        np.ones(len(depth)),
-    )
+    centre = foot - 0.5 * size[:, :, None] * [0.0, 1.0]
+    return moving_tracks(clock, centre, np.repeat(size[:, :, None], 2, axis=2))
 
 
 def ahead(vehicles: Traffic) -> SensorTracks:

@@ -20,8 +20,10 @@ from jeat_graph.rig.common_picture import CommonPicture
 from jeat_graph.rig.homography import fit_homography
 from jeat_graph.rig.points import map_of_points
 from jeat_graph.rig.registering import register_by_traffic
-from jeat_graph.rig.sensor_tracks import STEP_S, SensorTracks, TrackMeasurements
+from jeat_graph.rig.sensor_tracks import STEP_S, SensorTracks
 from jeat_graph.runs.own_tracks import own_tracks
+
+from .drawn_tracks import moving_tracks
 
 SEED = 14
 NAMES = ("rgb", "evt")
@@ -111,7 +113,7 @@ def test_traffic_that_does_not_tell_is_refused_and_no_file_is_written(
 
 
 def test_traffic_that_repeats_itself_tells_no_clock() -> None:
-    # In each of three lanes vehicles are alike, and 3 s apart: 3 s later all fit as well, to other partners.
+    # Equal vehicles every 3 s: with the clock wrong by 3 s each matches the vehicle before it just as well.
     lanes = [(100.0, 160.0), (180.0, 200.0), (260.0, 240.0)]
     t = np.arange(0.0, 60.0, STEP_S)
     centres = [
@@ -122,9 +124,8 @@ def test_traffic_that_repeats_itself_tells_no_clock() -> None:
     centre = np.stack(centres)
     centre[(centre[:, :, 0] < 0.0) | (centre[:, :, 0] > 600.0)] = np.nan
     centre = centre[np.isfinite(centre[:, :, 0]).sum(axis=1) > 10]
-    none = TrackMeasurements(np.zeros(0), np.zeros((0, 2)), np.zeros((0, 2)))
-    size, moves = np.full_like(centre, 40.0), np.ones(len(centre))
-    first, second = (SensorTracks(at, centre, size, [none] * len(centre), moves) for at in (0.0, 5.0))
+    size = np.full_like(centre, 40.0)
+    first, second = (moving_tracks(at, centre, size) for at in (0.0, 5.0))
     with pytest.raises(DataError, match="another one at quite another difference: record longer"):
         register_by_traffic(first, second, NAMES, ((640.0, 480.0), (640.0, 480.0)))
 
