@@ -21,8 +21,8 @@ def choose(
     average: float = 1.0,
     across: float | None = None,
     apart: frozenset[int] = frozenset(),
-) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Return corners (M, 4), scores (M,) and classes (M,) of what is left, the best first.
+) -> DecodedBoxes:
+    """Return what is left, the best first.
 
     A thing that the network takes for a car and for a truck has a box of each class. Whichever is better
     stays, whether or not it is wanted: where a bicycle has the better box, there is no motorcycle.
@@ -35,6 +35,7 @@ def choose(
             where the network has distinguished them itself (`found.distinct`).
         average: and becomes the mean, weighed by their scores, of all of its class that overlap it by at
             least so much: several cells of a network say where a vehicle is, each with an error of its own.
+            So are spreads: such errors have most in common, and a mean of equal ones would be as large.
             1: it stays as it is. Source: box voting, Gidaris and Komodakis, "Object detection via a
             multi-region and semantic segmentation-aware CNN model" (2015).
         across: of two of different classes that overlap by more the better stays; by default as `overlap`.
@@ -45,7 +46,8 @@ def choose(
     keep = (found.scores >= score) & np.isfinite(found.corners).all(axis=1)
     with np.errstate(invalid="ignore"):  # infinite corners are left out already
         keep &= (found.corners[:, 2:] - found.corners[:, :2] > _CENTRES_PX).all(axis=1)
-    corners, scores, classes = found.corners[keep], found.scores[keep], found.classes[keep]
+    found = found.taken(keep)
+    corners, scores, classes = found.corners, found.scores, found.classes
     boxes = np.column_stack([corners[:, :2], corners[:, 2:] - corners[:, :2]])
     rows: IntArray = np.argsort(-scores, kind="stable")
     if not found.distinct and len(scores):
@@ -56,13 +58,13 @@ def choose(
     rows = rows[_one_each(boxes[rows], classes[rows], overlap if across is None else across, apart)]
     if wanted is not None:
         rows = rows[np.isin(classes[rows], list(wanted))]
+    chosen = found.taken(rows)
     if average < 1.0 and not found.distinct and len(rows):
-        return (
-            _averaged(corners, boxes, scores, classes, rows, average),
-            np.clip(scores[rows], 0.0, 1.0),
-            classes[rows],
-        )
-    return corners[rows], np.clip(scores[rows], 0.0, 1.0), classes[rows]
+        weights = _weights(boxes, scores, classes, rows, average)
+        total = weights.sum(axis=1, keepdims=True)
+        spreads = None if found.spreads is None else weights @ found.spreads / total
+        chosen = chosen._replace(corners=weights @ corners / total, spreads=spreads)
+    return chosen._replace(scores=np.clip(chosen.scores, 0.0, 1.0))
 
 
 def _one_each(boxes: FloatArray, classes: IntArray, across: float, apart: frozenset[int]) -> BoolArray:
@@ -80,18 +82,12 @@ def _one_each(boxes: FloatArray, classes: IntArray, across: float, apart: frozen
     return stay
 
 
-def _averaged(
-    corners: FloatArray,
-    boxes: FloatArray,
-    scores: FloatArray,
-    classes: IntArray,
-    rows: IntArray,
-    average: float,
+def _weights(
+    boxes: FloatArray, scores: FloatArray, classes: IntArray, rows: IntArray, average: float
 ) -> FloatArray:
-    """Return the mean corners (M, 4) of what overlaps each box that stays (rows, (M,)), of its class."""
+    """Return the weights (M, N) by which boxes count for each that stays (rows, (M,))."""
     near = pairwise_iou(boxes[rows].astype(float), boxes.astype(float)) >= average
     weights = (near & (classes[rows][:, None] == classes[None])) * scores
     # Rounding may leave a box a hair short of overlapping itself.
     weights[np.arange(len(rows)), rows] = scores[rows]
-    mean: FloatArray = weights @ corners / weights.sum(axis=1, keepdims=True)
-    return mean
+    return np.asarray(weights)

@@ -160,8 +160,7 @@ class ModelEventDetector(BinnedDetector):
             found = self._outputs.read(looks[0])
         else:
             found = self._outputs.together([self._outputs.read_rows(one) for one in looks], self._tiling)
-        placed = found._replace(corners=self._places.back(found.corners))
-        return scan_within(t, self.sensor, placed, self.size_px)
+        return scan_within(t, self.sensor, found.scaled(1.0 / self._places.scale), self.size_px)
 
     def _run(
         self, inputs: dict[str, npt.NDArray[Any]], state: dict[str, npt.NDArray[Any]]

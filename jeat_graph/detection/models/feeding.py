@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jeat_graph.data.arrays import FloatArray
-from jeat_graph.detection.models.layouts.record import Feed
+from jeat_graph.detection.models.layouts.record import DecodedBoxes, Feed
 from jeat_graph.detection.models.layouts.registry import all_layouts
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.io.media.decoders import RgbImage
@@ -28,10 +28,16 @@ class Letterbox(NamedTuple):
 
     def back(self, corners: FloatArray) -> FloatArray:
         """Return corners (M, 4) in px of the picture."""
-        shift = np.array([self.left, self.top, self.left, self.top])
-        return np.asarray(
-            (corners - shift) / np.array([self.scale_x, self.scale_y, self.scale_x, self.scale_y])
-        )
+        return self.lengths_back(corners - np.array([self.left, self.top, self.left, self.top]))
+
+    def lengths_back(self, lengths: FloatArray) -> FloatArray:
+        """Return lengths (M, 4) in px of the picture, across, down, across and down."""
+        return np.asarray(lengths / np.array([self.scale_x, self.scale_y, self.scale_x, self.scale_y]))
+
+    def boxes_back(self, found: DecodedBoxes) -> DecodedBoxes:
+        """Return boxes, and what their sides may be off by, in px of the picture."""
+        spreads = None if found.spreads is None else self.lengths_back(found.spreads)
+        return found._replace(corners=self.back(found.corners), spreads=spreads)
 
 
 def usual_feed(layout: str, settings: ModelSettings) -> Feed:

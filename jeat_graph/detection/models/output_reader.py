@@ -12,6 +12,7 @@ import numpy.typing as npt
 from jeat_graph.data.arrays import FloatArray, IntArray, TextArray
 from jeat_graph.data.detections import Scan
 from jeat_graph.data.errors import DataError
+from jeat_graph.data.interop import from_xyxy
 from jeat_graph.detection.models.choosing import choose
 from jeat_graph.detection.models.class_names import (
     class_names,
@@ -25,7 +26,7 @@ from jeat_graph.detection.models.layouts.registry import decode, shapes_of
 from jeat_graph.detection.models.model_settings import AUTO, ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, Port
 from jeat_graph.detection.models.recognising import layout_of, network_of
-from jeat_graph.detection.models.tiling import TileBoxes, Tiling
+from jeat_graph.detection.models.tiling import Tiling
 
 # Of a picture's boxes so many may be without numbers; where more are, the others cannot be trusted either.
 _MOST_WITHOUT = 0.5
@@ -38,11 +39,18 @@ class FoundBoxes(NamedTuple):
         corners: (M, 4) left, top, right, bottom (px).
         scores: (M,) 0 to 1.
         classes: (M,) names, or None where the network has one class without a name.
+        spreads: (M, 4) standard deviations of left, top, right, bottom (px), or None where it gives none.
     """
 
     corners: FloatArray
     scores: FloatArray
     classes: TextArray | None
+    spreads: FloatArray | None = None
+
+    def scaled(self, times: float) -> FoundBoxes:
+        """Return the same in a picture so many times as large."""
+        spreads = None if self.spreads is None else self.spreads * times
+        return self._replace(corners=self.corners * times, spreads=spreads)
 
 
 class OutputReader:
@@ -104,11 +112,11 @@ class OutputReader:
         """
         return self.named(self.read_rows(outputs))
 
-    def named(self, found: TileBoxes) -> FoundBoxes:
+    def named(self, found: DecodedBoxes) -> FoundBoxes:
         """Return boxes with the names of their classes."""
-        return FoundBoxes(found.corners, found.scores, self._named(found.classes))
+        return FoundBoxes(found.corners, found.scores, self._named(found.classes), found.spreads)
 
-    def together(self, found: list[TileBoxes], tiling: Tiling) -> FoundBoxes:
+    def together(self, found: list[DecodedBoxes], tiling: Tiling) -> FoundBoxes:
         """Return what the tiles of a picture show, by the rules of one look: corners in its canvas (px).
 
         Args:
@@ -117,12 +125,9 @@ class OutputReader:
         """
         self._looks = "looks at tiles"
         _, overlap, _, _, _ = self._rules
-        corners, scores, classes = tiling.together(found, overlap)
-        # A network that has distinguished its boxes has done so in each tile for itself.
-        rows = DecodedBoxes(corners, scores, classes, distinct=False)
-        return self.named(TileBoxes(*choose(rows, None, *self._rules)))
+        return self.named(choose(tiling.together(found, overlap), None, *self._rules))
 
-    def read_rows(self, outputs: dict[str, npt.NDArray[Any]]) -> TileBoxes:
+    def read_rows(self, outputs: dict[str, npt.NDArray[Any]]) -> DecodedBoxes:
         """Return what is to be kept of one look, classes as numbers: its corners are in the input (px).
 
         Boxes without numbers are left out and counted.
@@ -138,7 +143,7 @@ class OutputReader:
             found = decode(self.layout, outputs, self._side, self._channels)
         except DataError as error:
             raise DataError(str(error), self._path) from None
-        return TileBoxes(*choose(self._with_numbers(found), self._wanted, *self._rules))
+        return choose(self._with_numbers(found), self._wanted, *self._rules)
 
     def _check_shapes(self, outputs: Mapping[str, npt.NDArray[Any]]) -> None:
         """Refuse a network whose first outputs are of another layout than what its file declares."""
@@ -177,6 +182,8 @@ class OutputReader:
     def _with_numbers(self, found: DecodedBoxes) -> DecodedBoxes:
         """Leave out the boxes that have no numbers, and count those of a score that is not too low."""
         numbers = np.isfinite(found.corners).all(axis=1) & np.isfinite(found.scores)
+        if found.spreads is not None:
+            numbers &= np.isfinite(found.spreads).all(axis=1) & (found.spreads >= 0.0).all(axis=1)
         without = int(np.count_nonzero(~numbers & ~(found.scores < self._score)))
         self._scans += 1
         self._scans_without += without > 0
@@ -189,8 +196,7 @@ class OutputReader:
             )
         if numbers.all():
             return found
-        corners, scores, classes, distinct = found
-        return DecodedBoxes(corners[numbers], scores[numbers], classes[numbers], distinct)
+        return found.taken(numbers)
 
 
 def scan_within(t: float, sensor: str, found: FoundBoxes, size_px: tuple[int, int]) -> Scan:
@@ -198,4 +204,5 @@ def scan_within(t: float, sensor: str, found: FoundBoxes, size_px: tuple[int, in
     corners = np.clip(found.corners, 0.0, [*size_px, *size_px])
     inside = (corners[:, 2:] - corners[:, :2] > 0.0).all(axis=1)
     classes = None if found.classes is None else found.classes[inside]
-    return Scan.from_xyxy(t, sensor, corners[inside], found.scores[inside], classes)
+    spreads = None if found.spreads is None else found.spreads[inside]
+    return Scan(t, sensor, from_xyxy(corners[inside]), found.scores[inside], classes, box_std=spreads)

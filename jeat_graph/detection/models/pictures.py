@@ -10,12 +10,13 @@ import numpy as np
 from jeat_graph.data.detections import Scan
 from jeat_graph.detection.models.engine import open_engine
 from jeat_graph.detection.models.feeding import letterbox_scale, place, scaled_px, usual_feed
+from jeat_graph.detection.models.layouts.record import DecodedBoxes
 from jeat_graph.detection.models.layouts.registry import all_layouts
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph.detection.models.output_reader import FoundBoxes, OutputReader, scan_within
 from jeat_graph.detection.models.recognising import recognised
-from jeat_graph.detection.models.tiling import TileBoxes, Tiling, tiled_scale
+from jeat_graph.detection.models.tiling import Tiling, tiled_scale
 from jeat_graph.io.media.decoders import RgbImage
 
 
@@ -78,13 +79,13 @@ class ModelPictureDetector:
             found = self._in_tiles(frame, size_px)
         return scan_within(t, self.sensor, found, size_px)
 
-    def _look(self, frame: RgbImage) -> TileBoxes:
+    def _look(self, frame: RgbImage) -> DecodedBoxes:
         """Return what the network finds in a picture or a tile, in its px."""
         height, width = frame.shape[:2]
         values, at = place(frame, self._side, self._feed)
         inputs = self._inputs.filled(values, (width, height))
         found = self._outputs.read_rows(self._engine.run(inputs))
-        return found if self._inputs.sizes is not None else found._replace(corners=at.back(found.corners))
+        return found if self._inputs.sizes is not None else at.boxes_back(found)
 
     def _in_tiles(self, frame: RgbImage, size_px: tuple[int, int]) -> FoundBoxes:
         import cv2
@@ -97,7 +98,7 @@ class ModelPictureDetector:
         # What lies beyond the picture in a tile is filled up as at the edge of a picture that is smaller.
         looks = [self._look(frame[top:bottom, left:right]) for left, top, right, bottom in tiling.places]
         found = self._outputs.together(looks, tiling)
-        return found._replace(corners=found.corners / scale)
+        return found.scaled(1.0 / scale)
 
     def note(self) -> str:
         """Say what was wrong with the network's outputs so far; empty if nothing was."""

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from jeat_graph.data.errors import DataError
 from jeat_graph.detection.models.exports import export_of, noted_side
 from jeat_graph.detection.models.layouts.numbers import cell_counts
-from jeat_graph.detection.models.layouts.record import ROWS, Network, OutputLayout
+from jeat_graph.detection.models.layouts.record import ROWS, SPREADS, Network, OutputLayout
 from jeat_graph.detection.models.layouts.registry import asked_for, recognise
 from jeat_graph.detection.models.model_settings import AUTO, ModelSettings
 from jeat_graph.detection.models.onnx_head import OnnxHead, Port
@@ -123,11 +123,12 @@ def given_shapes(
 def network_of(
     outputs: tuple[Port, ...], side: tuple[int, int], notes: Mapping[str, str], path: Path
 ) -> Network:
-    """Return what is known of a network.
+    """Return what is known of a network; spreads say nothing of its layout.
 
     Raises:
         DataError: its task gives no boxes.
     """
+    outputs = tuple(port for port in outputs if port.name != SPREADS)
     try:
         return Network(outputs, side, export_of(outputs, notes))
     except DataError as error:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from itertools import combinations, product
 from math import ceil
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ import numpy.typing as npt
 from jeat_graph.association.overlap import pairwise_iou
 from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.detection.models.feeding import letterbox_scale, scaled_px
+from jeat_graph.detection.models.layouts.record import DecodedBoxes
 
 #: Two neighbours share at least this much of a tile's side: a vehicle as wide is whole in one of them.
 _SHARED = 0.125
@@ -29,20 +30,6 @@ _CUT_PX = 8.0
 _KNOWN_SCALE = 1.5
 #: As many tiles as the camera's own size needs.
 UNLIMITED = 0
-
-
-class TileBoxes(NamedTuple):
-    """Boxes of one tile.
-
-    Attributes:
-        corners: (M, 4) left, top, right, bottom (px of the tile).
-        scores: (M,) 0 to 1.
-        classes: (M,) numbers.
-    """
-
-    corners: FloatArray
-    scores: FloatArray
-    classes: IntArray
 
 
 def tiled_scale(size_px: tuple[int, int], side: tuple[int, int], most: int, *, own: bool) -> float:
@@ -100,7 +87,7 @@ class Tiling:
             for left, top, right, bottom in self.places.tolist()
         ]
 
-    def together(self, found: list[TileBoxes], overlap: float) -> TileBoxes:
+    def together(self, found: list[DecodedBoxes], overlap: float) -> DecodedBoxes:
         """Return boxes (px of the canvas), each of a tile that sees it well; some may be of one thing still.
 
         Args:
@@ -122,8 +109,10 @@ class Tiling:
         # Half its size farther in: both tiles would have to be as wrong for each to leave it to the other.
         size = (corners[:, 2:] - corners[:, :2]).max(axis=1, initial=0.0)
         stays = ~((other >= _CUT_PX) & (cut | (other > own + _CUT_PX + size / 2.0)))
-        kept = TileBoxes(corners[stays], scores[stays], classes[stays])
-        return self._joined(kept, tile[stays], np.flatnonzero(cut[stays]), overlap)
+        spreads = [one.spreads for one in found if one.spreads is not None]
+        # A network that has distinguished its boxes has done so in each tile for itself.
+        every = DecodedBoxes(corners, scores, classes, False, np.concatenate(spreads) if spreads else None)
+        return self._joined(every.taken(stays), tile[stays], np.flatnonzero(cut[stays]), overlap)
 
     def _depths(self, corners: FloatArray) -> FloatArray:
         """Return how far within each tile boxes (M, 4) lie, (M, T) (px).
@@ -135,7 +124,7 @@ class Tiling:
         nearest: FloatArray = np.where(self._inner[None], distance, np.inf).min(axis=2)
         return nearest
 
-    def _joined(self, boxes: TileBoxes, tile: IntArray, cut: IntArray, overlap: float) -> TileBoxes:
+    def _joined(self, boxes: DecodedBoxes, tile: IntArray, cut: IntArray, overlap: float) -> DecodedBoxes:
         """Join the parts of what no tile sees whole; `cut` are their rows."""
         group = np.arange(len(tile))
         for a, b in combinations(cut.tolist(), 2):
@@ -143,14 +132,17 @@ class Tiling:
                 both = boxes.corners[[a, b]]
                 if _agree(both, self.places[tile[[a, b]]], overlap):
                     group[group == group[b]] = group[a]
-        corners, leads = [], []
+        outermost, leads = [], []
         for one in np.unique(group).tolist():
             rows = np.flatnonzero(group == one)
-            corners.append([*boxes.corners[rows, :2].min(axis=0), *boxes.corners[rows, 2:].max(axis=0)])
+            part = boxes.corners[rows]
+            outermost.append(rows[[*part[:, :2].argmin(axis=0), *part[:, 2:].argmax(axis=0)]])
             leads.append(rows[np.argmax(boxes.scores[rows])])
-        lead = np.array(leads, dtype=np.int64)
-        whole = np.array(corners, dtype=float).reshape(-1, 4)
-        return TileBoxes(whole, boxes.scores[lead], boxes.classes[lead])
+        of_side = np.array(outermost, dtype=np.int64).reshape(-1, 4)
+        sides = np.arange(4)
+        joined = boxes.taken(np.array(leads, dtype=np.int64))
+        spreads = None if boxes.spreads is None else boxes.spreads[of_side, sides]
+        return joined._replace(corners=boxes.corners[of_side, sides], spreads=spreads)
 
 
 def _agree(both: FloatArray, places: IntArray, overlap: float) -> bool:

@@ -1,11 +1,12 @@
 """The trained network as an ONNX file, in a layout that `detect` and `track` recognise, with its card inside.
 
-Output `boxes` (1, 5, N): middle and size in px of the input, and a score. Input `picture` (1, 3, H, W), red
-first, 0 to 1; or `events` (1, 2 x bins, H, W) counts and one state a level of the memory, which come back as
-outputs of the same shapes. One whose memory goes by time also takes `elapsed` (1, 1): how much has passed
-since the window before (s), or what the first window spans. A network of both sensors takes `events`,
-`picture` and `given` (1, 3): whether there is a picture (1 or 0), how old it is (s), and whether there are
-events (1 or 0).
+Output `boxes` (1, 5, N): middle and size in px of the input, and a score; output `spreads` (1, 4, N), of a
+network that has them: standard deviations of left, top, right and bottom in px of the input. Input
+`picture` (1, 3, H, W), red first, 0 to 1; or `events` (1, 2 x bins, H, W) counts and one state a level of the
+memory, which come back as outputs of the same shapes. One whose memory goes by time also takes `elapsed`
+(1, 1): how much has passed since the window before (s), or what the first window spans. A network of both
+sensors takes `events`, `picture` and `given` (1, 3): whether there is a picture (1 or 0), how old it is (s),
+and whether there are events (1 or 0).
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ def write_onnx(
             dynamo=False,
             opset_version=_OPSET,
             input_names=[*inputs, *(f"state_{k}" for k in states)],
-            output_names=["boxes", *(f"next_state_{k}" for k in states)],
+            output_names=served.outputs,
         )
     model = onnx.load_from_string(buffer.getvalue())
     share_weights(model)

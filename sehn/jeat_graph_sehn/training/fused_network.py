@@ -120,12 +120,12 @@ class FusedNet(VehicleNet):
         self.events = events
         self.join = nn.ModuleList(GatedSum(channels) for channels in levels)
         self.recall = nn.ModuleList(Recall(channels) for channels in levels)
-        self.head = Head(settings.width)
+        self.head = Head(settings.width, settings.spreads)
 
     def hold_pictures(self) -> None:
         """Keep what looks at pictures and says where vehicles are as it is; the rest learns."""
-        for part in (self.pictures, self.head):
-            part.requires_grad_(False)
+        self.pictures.requires_grad_(False)
+        self.head.hold_boxes()
 
     def forward(
         self,
@@ -145,7 +145,7 @@ class FusedNet(VehicleNet):
             elapsed_s: (L x B,) since the window before each (s), for a memory that goes by time.
 
         Returns:
-            Rows (L x B, N, 5), and the state after the last window.
+            Rows as `DetectionNet.forward`, and the state after the last window.
         """
         count = len(self.events.states)
         of_events, kept = self.events(x, state[:count], length, elapsed_s)

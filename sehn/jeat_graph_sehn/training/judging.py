@@ -21,7 +21,7 @@ from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Pictu
 from jeat_graph_sehn.training.event_samples import windows_of
 from jeat_graph_sehn.training.fused_network import FusedNet
 from jeat_graph_sehn.training.network import PICTURE_INPUT, VehicleNet
-from jeat_graph_sehn.training.serving import ServedNet
+from jeat_graph_sehn.training.serving import BOXES, ServedNet
 from jeat_graph_sehn.training.settings import NetSettings, TrainSettings
 from jeat_graph_sehn.training.truth_at import TrueBoxes
 
@@ -258,7 +258,9 @@ class _Reader:
 
     def look(self, shown: tuple[torch.Tensor, ...]) -> tuple[FloatArray, FloatArray]:
         """Return corners (M, 4) and scores (M,); what the network remembers goes on."""
-        boxes, *self._state = self._served(*(one.to(self._device) for one in shown), *self._state)
-        found = decode(LAYOUT, {"boxes": boxes.cpu().numpy()}, self._side)
-        corners, scores, _ = choose(found, None, _LEAST_SCORE, *OWN_OVERLAPS)
-        return corners, scores
+        given = self._served(*(one.to(self._device) for one in shown), *self._state)
+        boxes = given[self._served.outputs.index(BOXES)]
+        self._state = given[len(given) - len(self._state) :]
+        found = decode(LAYOUT, {BOXES: boxes.cpu().numpy()}, self._side)
+        chosen = choose(found, None, _LEAST_SCORE, *OWN_OVERLAPS)
+        return chosen.corners, chosen.scores

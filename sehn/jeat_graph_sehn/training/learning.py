@@ -15,7 +15,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from jeat_graph_sehn.training.network import centred_boxes, corners_of
+from jeat_graph_sehn.training.network import ROW, centred_boxes, corners_of, mean_errors
 
 #: α and β of the alignment, and how many cells stand for one vehicle.
 SCORE_POWER, IOU_POWER, CELLS = 0.5, 6.0, 10
@@ -47,11 +47,12 @@ class Assigned(NamedTuple):
 
 
 class Cost(NamedTuple):
-    """What mistakes cost: all, and its two parts."""
+    """What mistakes cost: all, and its parts; that of spreads is 0 where there are none."""
 
     total: Tensor
     scores: Tensor
     boxes: Tensor
+    spreads: Tensor
 
 
 def paired_overlaps(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
@@ -108,7 +109,7 @@ def cost_of(rows: Tensor, targets: list[Target], places: Tensor, strides: Tensor
     """Say what a batch's mistakes cost.
 
     Args:
-        rows: (B, N, 5) of the network.
+        rows: (B, N, 5 and more) of the network.
         targets: of each picture.
         places: (N, 2) column and row of each cell.
         strides: (N,) px.
@@ -116,23 +117,38 @@ def cost_of(rows: Tensor, targets: list[Target], places: Tensor, strides: Tensor
     """
     corners = corners_of(centred_boxes(rows, places, strides))
     logits = rows[..., 4]
-    asked, weight, box_cost, box_score = [], [], [], []
+    errors = mean_errors(rows, strides) if rows.shape[-1] > ROW else None
+    asked, weight, box_cost, box_score, spread_cost = [], [], [], [], [strides.new_zeros(0)]
     for k, target in enumerate(targets):
         given = assign(corners[k].detach(), logits[k].detach().sigmoid(), places, strides, target.boxes)
         mine = torch.nonzero(given.vehicle >= 0).squeeze(1)
         asked.append(given.score)
         weight.append(_counts(given.vehicle >= 0, places, strides, target.ignored))
-        _, giou = paired_overlaps(corners[k][mine], target.boxes[given.vehicle[mine]])
+        wanted_boxes = target.boxes[given.vehicle[mine]]
+        _, giou = paired_overlaps(corners[k][mine], wanted_boxes)
         box_cost.append(1.0 - giou)
         box_score.append(given.score[mine])
+        if errors is not None:
+            spread_cost.append(_surprise(corners[k][mine].detach() - wanted_boxes, errors[k][mine]))
     wanted = torch.stack(asked)
     share = wanted.sum().clamp(min=1.0)
     entropy = torch.nn.functional.binary_cross_entropy_with_logits(
         logits, wanted, torch.stack(weight), reduction="sum"
     )
     of_scores = entropy / share
-    of_boxes = (torch.cat(box_cost) * torch.cat(box_score)).sum() / share
-    return Cost(of_scores + box_weight * of_boxes, of_scores, of_boxes)
+    trusted = torch.cat(box_score)
+    of_boxes = (torch.cat(box_cost) * trusted).sum() / share
+    of_spreads = share.new_zeros(()) if errors is None else (torch.cat(spread_cost) * trusted).sum() / share
+    return Cost(of_scores + box_weight * of_boxes + of_spreads, of_scores, of_boxes, of_spreads)
+
+
+def _surprise(error: Tensor, mean_error: Tensor) -> Tensor:
+    """Return the negative logarithmic likelihood (M,) of errors of sides (M, 4), but for a constant.
+
+    Their distribution is Laplace's: few boxes are hidden, or of another vehicle, and far off; a Gaussian
+    would be as wide as those.
+    """
+    return (error.abs() / mean_error + torch.log(mean_error)).mean(dim=1)
 
 
 def _counts(taken: Tensor, places: Tensor, strides: Tensor, ignored: Tensor) -> Tensor:

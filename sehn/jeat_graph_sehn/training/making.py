@@ -20,7 +20,7 @@ from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.detection.models.onnx_head import CARD, read_onnx_head
 from jeat_graph_sehn.training.fused_network import FusedNet, GatedSum, silence
 from jeat_graph_sehn.training.lasting import Lasting
-from jeat_graph_sehn.training.network import Backbone, DetectionNet, VehicleNet
+from jeat_graph_sehn.training.network import DetectionNet, VehicleNet
 from jeat_graph_sehn.training.settings import COARSEST, EVENTS, FRAMES, FUSED, NetSettings
 from jeat_graph_sehn.training.widening import widen
 
@@ -30,6 +30,7 @@ SECOND_LOOK = "second_look"
 LASTS_S = "lasts_s"
 _NOT_OURS = "is no network that `train` made"
 _SIDE = (COARSEST, COARSEST)
+_SPREAD = "spread."
 _TINY = 1e-12
 
 
@@ -74,7 +75,8 @@ def settings_of(path: Path) -> NetSettings:
         DataError: not a file that `train` made.
     """
     try:
-        return NetSettings(**card_of(path)["net"])
+        # A card that does not mention spreads is of a network without.
+        return NetSettings(**{"spreads": False, **card_of(path)["net"]})
     except (KeyError, TypeError, ValueError, ConfigError):
         raise DataError(_NOT_OURS, path) from None
 
@@ -153,11 +155,15 @@ def _as_wide(net: VehicleNet, width: int) -> VehicleNet:
     return wide
 
 
-def _take(net: VehicleNet | Backbone, given: VehicleNet | Backbone) -> None:
-    """Take all weights of a network. One whose memory goes by windows has none for going by time."""
+def _take(net: nn.Module, given: nn.Module) -> None:
+    """Take all weights of a network. One whose memory goes by windows has none for going by time.
+
+    Nor have those of before for spreads; where spreads are not wanted, theirs are left.
+    """
     lacking = net.load_state_dict(given.state_dict(), strict=False)
-    new = ("lasting.", "traces.")
-    if lacking.unexpected_keys or not all(any(f in name for f in new) for name in lacking.missing_keys):
+    new = ("lasting.", "traces.", _SPREAD)
+    left = [name for name in lacking.unexpected_keys if _SPREAD not in name]
+    if left or not all(any(f in name for f in new) for name in lacking.missing_keys):
         raise ValueError(f"weights do not fit: {lacking}")  # _fits() lets none through
 
 
@@ -171,7 +177,7 @@ def _take_parts(net: FusedNet, given: dict[str, VehicleNet]) -> None:
     begins = FUSED not in given
     head = frames or (events if begins else None)
     if isinstance(head, DetectionNet):
-        net.head.load_state_dict(head.head.state_dict())
+        _take(net.head, head.head)
     if begins and frames is not None:
         for join in net.join:
             assert isinstance(join, GatedSum)

@@ -29,11 +29,16 @@ from jeat_graph_sehn.training.settings import COARSEST, STRIDES, NetSettings
 PICTURE_INPUT, EVENTS_INPUT = "picture", "events"
 #: Numbers of a cell: two of the middle, two of the size, one of the class.
 ROW = 5
+#: And of its sides, left, top, right, bottom, how far off they may be.
+SIDES = 4
 #: Share of the cells with a vehicle that the first weights expect: so the many empty ones do not drown them.
 _PRIOR = 0.01
 #: A box is first about e cells wide: 11, 22 and 43 px.
 _FIRST_SIZE = 1.0
 _LOG_SIZE = (-3.0, 5.0)
+#: Sides are first said to be off by a quarter of a cell.
+_FIRST_SPREAD = -1.4
+_LOG_SPREAD = (-4.0, 4.0)
 #: Events of a pixel in a bin above this say no more. The first normalisation sees to their scale.
 _MOST_COUNT = 8
 
@@ -111,11 +116,15 @@ class Backbone(nn.Module):
 class Head(nn.Module):
     """A pyramid that carries what coarse levels know to the fine ones, and the rows of all cells.
 
+    How far off sides may be is learned of the same features without changing them: boxes and scores are those
+    that they would be without.
+
     Args:
         width: of the backbone.
+        spreads: whether it says how far off sides may be.
     """
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, spreads: bool) -> None:
         super().__init__()
         shared = 2 * width
         self.lateral = nn.ModuleList(ConvBlock(given, shared, 1) for given in level_channels(width))
@@ -126,9 +135,20 @@ class Head(nn.Module):
         nn.init.normal_(self.row.weight, std=0.01)
         prior = -math.log((1 - _PRIOR) / _PRIOR)
         self.row.bias = nn.Parameter(torch.tensor([0.0, 0.0, _FIRST_SIZE, _FIRST_SIZE, prior]))
+        self.spread = nn.Conv2d(shared, SIDES, 1) if spreads else None
+        if self.spread is not None:
+            nn.init.zeros_(self.spread.weight)
+            assert self.spread.bias is not None
+            nn.init.constant_(self.spread.bias, _FIRST_SPREAD)
+
+    def hold_boxes(self) -> None:
+        """Keep boxes and scores as they are; how far off sides may be is still learned."""
+        self.requires_grad_(False)
+        if self.spread is not None:
+            self.spread.requires_grad_(True)
 
     def forward(self, levels: tuple[Tensor, Tensor, Tensor]) -> Tensor:
-        """Return rows (B, N, 5) of features, fine to coarse."""
+        """Return rows (B, N, 5), or 9 with spreads, of features, fine to coarse."""
         fine, middle, coarse = levels
         low = self.lateral[2](coarse)
         mid = self.merge[1](self.lateral[1](middle) + _doubled(low))
@@ -136,7 +156,10 @@ class Head(nn.Module):
         rows = []
         for level, features in enumerate((top, mid, low)):
             seen = torch.relu(self.tower_norm[level](self.tower(features)))
-            rows.append(self.row(seen).flatten(2))
+            row = self.row(seen)
+            if self.spread is not None:
+                row = torch.cat([row, self.spread(seen.detach())], dim=1)
+            rows.append(row.flatten(2))
         return torch.cat(rows, dim=2).transpose(1, 2)
 
 
@@ -150,7 +173,10 @@ class VehicleNet(nn.Module):
     Attributes:
         settings: the same.
         states: the same.
+        head: says where vehicles are.
     """
+
+    head: Head
 
     def __init__(self, settings: NetSettings, states: tuple[tuple[int, int], ...]) -> None:
         super().__init__()
@@ -204,7 +230,7 @@ class DetectionNet(VehicleNet):
         backbone = Backbone(settings.channels, settings, settings.has_memory)
         super().__init__(settings, backbone.states)
         self.backbone = backbone
-        self.head = Head(settings.width)
+        self.head = Head(settings.width, settings.spreads)
 
     def forward(
         self,
@@ -227,13 +253,14 @@ class DetectionNet(VehicleNet):
 
         Returns:
             Rows (L x B, N, 5), fine level first, row by row: middle (cells from the cell's own), size
-            (logarithm, in cells) and logit; and the state after the last window.
+            (logarithm, in cells) and logit, with spreads four numbers more: logarithms, in cells, of how far
+            off left, top, right and bottom are on the average; and the state after the last window.
         """
         levels, kept = self.backbone(x, state, length, elapsed_s)
         return self.head(levels), kept
 
     def hold_first(self) -> None:
-        """Keep the layers up to the finest level as they are; the rest learns."""
+        """Keep the layers up to the finest level as they are; the rest is learned."""
         for part in (self.backbone.stem, self.backbone.to_4):
             part.requires_grad_(False)
 
@@ -316,16 +343,33 @@ def cell_places(side: tuple[int, int]) -> tuple[Tensor, Tensor]:
 
 
 def centred_boxes(rows: Tensor, places: Tensor, strides: Tensor) -> Tensor:
-    """Turn rows (B, N, 5) into middle and size (B, N, 4) in px of the input."""
+    """Turn rows (B, N, 5 and more) into middle and size (B, N, 4) in px of the input."""
     middle = (places + 0.5 + rows[..., :2]) * strides[:, None]
     size = torch.exp(torch.clamp(rows[..., 2:4], *_LOG_SIZE)) * strides[:, None]
     return torch.cat([middle, size], dim=-1)
 
 
 def served_boxes(rows: Tensor, places: Tensor, strides: Tensor) -> Tensor:
-    """Turn rows (B, N, 5) into middle and size in px of the input, and score (B, 5, N), as ONNX has them."""
+    """Turn rows (B, N, 5 and more) into middle and size in px of the input, and score, as ONNX has them.
+
+    Returns:
+        (B, 5, N).
+    """
     boxes = centred_boxes(rows, places, strides)
-    return torch.cat([boxes, rows[..., 4:].sigmoid()], dim=-1).transpose(1, 2)
+    return torch.cat([boxes, rows[..., 4:ROW].sigmoid()], dim=-1).transpose(1, 2)
+
+
+def mean_errors(rows: Tensor, strides: Tensor) -> Tensor:
+    """Return how far off left, top, right and bottom are on the average (B, N, 4), px, of rows (B, N, 9)."""
+    return torch.exp(torch.clamp(rows[..., ROW:], *_LOG_SPREAD)) * strides[:, None]
+
+
+def served_spreads(rows: Tensor, strides: Tensor) -> Tensor:
+    """Return standard deviations of the sides (B, 4, N) in px of the input, as ONNX has them.
+
+    Of errors with a Laplace distribution, whose mean size times √2 they are.
+    """
+    return math.sqrt(2.0) * mean_errors(rows, strides).transpose(1, 2)
 
 
 def corners_of(boxes: Tensor) -> Tensor:

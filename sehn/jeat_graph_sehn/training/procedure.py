@@ -45,6 +45,8 @@ from jeat_graph_sehn.training.settings import (
     EVENTS,
     FRAMES,
     FUSED,
+    HOLD_BOXES,
+    HOLD_FIRST,
     NetSettings,
     TrainSettings,
     padded,
@@ -221,8 +223,13 @@ def _check_kind(request: TrainRequest) -> None:
     """Refuse what has no meaning for a network of its kind, or without one to start from."""
     if request.net.kind != EVENTS and request.settings.stream_share > 0.0:
         raise ConfigError("stream_share: only networks of events learn from streams")
-    if request.settings.hold_first and (request.net.kind == FUSED or not request.start):
-        raise ConfigError("hold_first: give the network of one sensor whose layers shall stay (--start)")
+    hold = request.settings.hold
+    if hold == HOLD_FIRST and (request.net.kind == FUSED or not request.start):
+        raise ConfigError("hold=first: give the network of one sensor whose layers shall stay (--start)")
+    if hold == HOLD_BOXES and not request.start:
+        raise ConfigError("hold=boxes: give the network whose boxes shall stay as they are (--start)")
+    if hold == HOLD_BOXES and not request.net.spreads:
+        raise ConfigError("hold=boxes: with net.spreads=false nothing is left to learn")
 
 
 def _check_fused(request: TrainRequest) -> None:

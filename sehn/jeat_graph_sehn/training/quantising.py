@@ -20,6 +20,7 @@ from jeat_graph.data.errors import ConfigError, DataError
 from jeat_graph.data.events import EventArray
 from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.feeding import place, usual_feed
+from jeat_graph.detection.models.layouts.record import SPREADS
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, OnnxHead, read_onnx_head
 from jeat_graph.io.files.atomic import atomic_path
@@ -30,6 +31,7 @@ from jeat_graph_sehn.training.judging import LAYOUT
 from jeat_graph_sehn.training.lasting import ELAPSED_INPUT
 from jeat_graph_sehn.training.making import settings_of
 from jeat_graph_sehn.training.network import EVENTS_INPUT, PICTURE_INPUT
+from jeat_graph_sehn.training.serving import BOXES
 from jeat_graph_sehn.training.settings import EVENTS, FUSED, NetSettings
 
 #: At most so many pictures, or windows of events, are looked at: extremes settle soon.
@@ -38,7 +40,6 @@ MOST_LOOKS = 64
 _WINDOWS, _EACH = 12, 4
 #: What becomes 8-bit numbers. The last convolutions and what is behind them are no part of it.
 _LAYERS = ["Conv", "Relu", "Add", "Concat", "Resize"]
-_BOXES = "boxes"
 #: In the names of the layers that add up the counts of cells.
 _SUMS = "/sums/"
 _US = 1e6
@@ -145,7 +146,7 @@ def _windows(
 
     session = onnxruntime.InferenceSession(str(network), providers=["CPUExecutionProvider"])
     names = [port.name for port in session.get_outputs()]
-    later = [name for name in names if name != _BOXES]
+    later = [name for name in names if name not in (BOXES, SPREADS)]
     beside = [ELAPSED_INPUT] if settings.by_time else []
     states = [port for port in head.inputs[1:] if port.name not in beside]
     state = {p.name: np.zeros([s or 1 for s in p.shape], dtype=np.float32) for p in states}

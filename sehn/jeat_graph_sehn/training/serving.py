@@ -12,15 +12,19 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
+from jeat_graph.detection.models.layouts.record import SPREADS
 from jeat_graph_sehn.training.network import (
     EVENTS_INPUT,
     PICTURE_INPUT,
     VehicleNet,
     cell_places,
     served_boxes,
+    served_spreads,
 )
 from jeat_graph_sehn.training.settings import COARSEST
 
+#: Names of outputs.
+BOXES = "boxes"
 #: √area (px of the input) from which on the first look is not asked, and below which the second is not. What
 #: lies between is asked of both: whoever is surer counts.
 LARGE_PX, SMALL_PX = 96.0, 48.0
@@ -50,29 +54,45 @@ class ServedNet(nn.Module):
             self.register_buffer(f"places_{k}", places)
             self.register_buffer(f"strides_{k}", strides)
 
+    @property
+    def outputs(self) -> list[str]:
+        """Names of what it returns: boxes, spreads if it has them, and the next states."""
+        states = range(len(self.looks) * len(self.net.states))
+        spreads = [SPREADS] if self.net.settings.spreads else []
+        return [BOXES, *spreads, *(f"next_state_{k}" for k in states)]
+
     def empty_state(self) -> tuple[Tensor, ...]:
         """Return the states of nothing seen: those of the first look, then those of the second."""
         return tuple(one for look in self.looks for one in self.net.empty_state(1, look))
 
     def forward(self, *values: Tensor) -> tuple[Tensor, ...]:
-        """Return boxes and scores (1, 5, N), and the next states, of inputs and states."""
+        """Return what `outputs` names, of inputs and states.
+
+        Boxes and scores are (1, 5, N), spreads (1, 4, N).
+        """
         shown, state = values[: len(self._names)], values[len(self._names) :]
         count = len(self.net.states)
-        boxes, kept = self._look(0, shown, state[:count])
+        (boxes, *spreads), kept = self._look(0, shown, state[:count])
         if len(self.looks) == 1:
-            return (boxes, *kept)
+            return (boxes, *spreads, *kept)
         halved = [_halved(name, value) for name, value in zip(self._names, shown, strict=True)]
-        large, also_kept = self._look(1, halved, state[count:])
+        (large, *also_spreads), also_kept = self._look(1, halved, state[count:])
         large = torch.cat([2.0 * large[:, :4], large[:, 4:]], dim=1)
         both = torch.cat([_among(boxes, -1.0, LARGE_PX), _among(large, 1.0, SMALL_PX)], dim=2)
-        return (both, *kept, *also_kept)
+        pairs = zip(spreads, also_spreads, strict=True)
+        spreads = [torch.cat([small, 2.0 * doubled], dim=2) for small, doubled in pairs]
+        return (both, *spreads, *kept, *also_kept)
 
     def _look(
         self, number: int, shown: Sequence[Tensor], state: Sequence[Tensor]
-    ) -> tuple[Tensor, tuple[Tensor, ...]]:
+    ) -> tuple[list[Tensor], tuple[Tensor, ...]]:
+        """Return boxes, and spreads if there are any; and the next states."""
         rows, kept = self.net.serve((*shown, *state))
         places, strides = self.get_buffer(f"places_{number}"), self.get_buffer(f"strides_{number}")
-        return served_boxes(rows, places, strides), kept
+        found = [served_boxes(rows, places, strides)]
+        if self.net.settings.spreads:
+            found.append(served_spreads(rows, strides))
+        return found, kept
 
 
 def _halved(name: str, value: Tensor) -> Tensor:

@@ -16,6 +16,8 @@ WIDTHS = {"tiny": 8, "small": 16, "medium": 32, "large": 48}
 LABEL_SETS = ("gen1", "1mpx", "etram")
 #: Channels of a picture: red, green, blue.
 COLOURS = 3
+#: What of a network that another starts from stays as it is.
+HOLD_NOTHING, HOLD_FIRST, HOLD_BOXES = "nothing", "first", "boxes"
 #: What a memory's forgetting goes by.
 BY_WINDOWS, BY_TIME = "windows", "time"
 
@@ -44,6 +46,8 @@ class NetSettings(Section):
         "has a time constant of its own, which is learnt, changes only where events come, and leaky counts "
         "of 0.1, 0.5 and 2 s are shown beside the bins",
     )
+
+    spreads: bool = flag(True, "whether it says, beside each box, how far off each of its sides may be")
 
     @property
     def channels(self) -> int:
@@ -189,10 +193,12 @@ class TrainSettings(Section):
         "whether each segment of pictures is shown equally often, not each picture: worlds of many pictures, "
         "which are very similar, do not outweigh those of few",
     )
-    hold_first: bool = flag(
-        False,
-        "whether the layers up to the finest level (4 px) stay as they are in the start: a step then takes "
-        "half of the time, and what is learned is what to remember",
+    hold: str = choice(
+        HOLD_NOTHING,
+        (HOLD_NOTHING, HOLD_FIRST, HOLD_BOXES),
+        "what stays as it is in the start; first: the layers up to the finest level (4 px), so that a step "
+        "takes half of the time, and what is learned is what to remember; boxes: all but how far off sides "
+        "may be",
     )
     second_look: bool = flag(
         False,

@@ -23,9 +23,11 @@ from jeat_graph_sehn.training.lasting import Lasting
 from jeat_graph_sehn.training.learning import cost_of
 from jeat_graph_sehn.training.making import new_network
 from jeat_graph_sehn.training.network import DetectionNet, VehicleNet, cell_places
-from jeat_graph_sehn.training.settings import BFLOAT16, NetSettings, TrainSettings
+from jeat_graph_sehn.training.settings import BFLOAT16, HOLD_BOXES, HOLD_FIRST, NetSettings, TrainSettings
 
 _CHECKPOINT_S = 60.0
+#: Of each cost a sum, and how many steps they are of.
+_SUMS = 5
 _S_PER_MIN = 60.0
 
 
@@ -38,7 +40,8 @@ class LogRow(NamedTuple):
         learning_rate: now.
         loss: mean since the last row, with its parts:
         loss_scores: of the scores,
-        loss_boxes: of the boxes, before their weight.
+        loss_boxes: of the boxes, before their weight,
+        loss_spreads: of how far off their sides are said to be.
         ap50: of the averaged weights on what is judged (%).
         ap: mean over thresholds .50 to .95 (%).
     """
@@ -49,6 +52,7 @@ class LogRow(NamedTuple):
     loss: float
     loss_scores: float
     loss_boxes: float
+    loss_spreads: float
     ap50: float
     ap: float
 
@@ -103,8 +107,11 @@ class Trainer:
         net = new_network(job.net, job.start)
         if isinstance(net, FusedNet) and settings.fused.hold_pictures:
             net.hold_pictures()
-        if isinstance(net, DetectionNet) and settings.hold_first:
+        if isinstance(net, DetectionNet) and settings.hold == HOLD_FIRST:
             net.hold_first()
+        if settings.hold == HOLD_BOXES:
+            net.requires_grad_(False)
+            net.head.hold_boxes()
         self.net = net.to(job.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         self.average = copy.deepcopy(self.net).requires_grad_(False)
         self._optimiser = torch.optim.AdamW(
@@ -116,7 +123,7 @@ class Trainer:
         self.total = max(math.ceil(settings.epochs * self._batches.per_epoch), 1)
         self._spent_s = 0.0
         self._unsettled = 1.0 - settings.settled_share
-        self._sums = [0.0, 0.0, 0.0, 0.0]
+        self._sums = [0.0] * _SUMS
         #: What is remembered at the end of the last step, of streams that go on.
         self._remembered: tuple[Tensor, ...] = ()
         if job.checkpoint.is_file():
@@ -205,7 +212,7 @@ class Trainer:
         torch.nn.utils.clip_grad_norm_(self.net.parameters(), settings.clip)
         self._optimiser.step()
         self.step += 1
-        self._sums[3] += 1.0
+        self._sums[-1] += 1.0
         self._follow()
 
     def _state_before(self, batch: ShownBatch) -> tuple[Tensor, ...]:
@@ -229,14 +236,14 @@ class Trainer:
                 mean.copy_(now)
 
     def _write_row(self, progress: float, on_look: Callable[[int, int], object]) -> None:
-        job, steps = self._job, max(self._sums[3], 1.0)
+        job, steps = self._job, max(self._sums[-1], 1.0)
         most = job.settings.judged
         found = judge(self.average, job.split.judged, job.side, job.settings, most, on_look)["all"]
-        loss, scores, boxes = (value / steps for value in self._sums[:3])
+        losses = (value / steps for value in self._sums[:-1])
         # With `minutes` the share is of time, which is never twice the same.
         done = min(progress, 1.0)
-        self.log.append(LogRow(self.step, done, self._rate(done), loss, scores, boxes, found.ap50, found.ap))
-        self._sums = [0.0, 0.0, 0.0, 0.0]
+        self.log.append(LogRow(self.step, done, self._rate(done), *losses, found.ap50, found.ap))
+        self._sums = [0.0] * _SUMS
 
     def _words(self) -> str:
         return f"AP50 {self.log[-1].ap50:.1f}" if self.log else ""
@@ -244,7 +251,7 @@ class Trainer:
     def words(self) -> str:
         """Say how far it is: steps, the loss since the last look, and what that look found."""
         goal = f" of {self.total}" if self._job.settings.minutes is None else ""
-        steps = self._sums[3]
+        steps = self._sums[-1]
         loss = self._sums[0] / steps if steps else self.log[-1].loss if self.log else math.nan
         found = f", {self._words()}" if self.log else ""
         return f"step {self.step}{goal}, loss {loss:.3g}{found}"

@@ -20,7 +20,13 @@ from jeat_graph_sehn.training.learning import (  # noqa: E402
     cost_of,
     paired_overlaps,
 )
-from jeat_graph_sehn.training.network import cell_places, centred_boxes, corners_of  # noqa: E402
+from jeat_graph_sehn.training.network import (  # noqa: E402
+    DetectionNet,
+    cell_places,
+    centred_boxes,
+    corners_of,
+)
+from jeat_graph_sehn.training.settings import NetSettings  # noqa: E402
 
 SIDE = (32, 16)
 
@@ -124,23 +130,40 @@ def test_cells_in_what_is_ignored_cost_nothing():
     assert cost.total.item() == pytest.approx(len(strides) / 2.0 * math.log(2.0), rel=1e-5)
 
 
-def test_the_cost_of_one_vehicle_is_that_of_its_formula():
+@pytest.mark.parametrize("numbers", [5, 9])
+def test_the_cost_of_one_vehicle_is_that_of_its_formula(numbers):
     places, strides = cell_places(SIDE)
-    rows = torch.randn(1, len(strides), 5, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
+    rows = torch.randn(
+        1, len(strides), numbers, generator=torch.Generator().manual_seed(1), dtype=torch.float64
+    )
     places, strides = places.double(), strides.double()
     box = torch.tensor([[9.0, 3.0, 21.0, 12.0]], dtype=torch.float64)
     cost = cost_of(rows, [Target(box, torch.zeros(0, 4))], places, strides, 4.0)
     corners = corners_of(centred_boxes(rows, places, strides))[0]
     given = assign(corners, rows[0, :, 4].sigmoid(), places, strides, box)
     share = max(float(given.score.sum()), 1.0)
-    entropy = boxes = 0.0
+    entropy = boxes = spreads = 0.0
     for n in range(len(strides)):
         p, y = 1.0 / (1.0 + math.exp(-float(rows[0, n, 4]))), float(given.score[n])
         entropy -= y * math.log(p) + (1.0 - y) * math.log(1.0 - p)
         if given.vehicle[n] >= 0:
             boxes += y * (1.0 - float(paired_overlaps(corners[n], box[0])[1]))
+            for side, log_cells in enumerate(rows[0, n, 5:].tolist()):
+                mean = math.exp(log_cells) * float(strides[n])
+                off = abs(float(corners[n, side] - box[0, side]))
+                spreads -= y * math.log(math.exp(-off / mean) / mean) / 4.0
     assert cost.scores.item() == pytest.approx(entropy / share, rel=1e-6)
-    assert cost.total.item() == pytest.approx((entropy + 4.0 * boxes) / share, rel=1e-6)
+    assert cost.spreads.item() == pytest.approx(spreads / share, rel=1e-6)
+    assert cost.total.item() == pytest.approx((entropy + 4.0 * boxes + spreads) / share, rel=1e-6)
+
+
+def test_how_far_off_sides_are_changes_neither_boxes_nor_what_they_are_found_by():
+    torch.manual_seed(3)
+    net = DetectionNet(NetSettings(kind="frames", width=2)).train()
+    rows, _ = net(torch.rand(2, 3, *SIDE[::-1]))
+    rows[..., 5:].sum().backward()
+    touched = {name for name, value in net.named_parameters() if value.grad is not None and value.grad.any()}
+    assert touched == {"head.spread.weight", "head.spread.bias"}
 
 
 def test_boxes_that_fit_and_are_sure_cost_least():

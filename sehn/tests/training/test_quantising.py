@@ -49,7 +49,8 @@ def written(folder, kind, twice=False):
 
 def settings_of_kind(kind):
     """Settings of a network; `time` is of events, with a memory that goes by time."""
-    return {"width": 6, **({"kind": "events", "memory": "time"} if kind == "time" else {"kind": kind})}
+    by_kind = {"kind": "events", "memory": "time"} if kind == "time" else {"kind": kind}
+    return {"width": 6, "spreads": True, **by_kind}
 
 
 @pytest.mark.parametrize("twice", [False, True])
@@ -79,11 +80,11 @@ def test_it_says_nearly_what_the_network_said(kind, twice, network, small_set, t
     # 8 bits a layer leave a few per cent of what a layer's features spread over.
     assert np.abs(whole[:, :4] - small[:, :4]).mean() < 0.1 * whole[:, :4].std()
     assert np.abs(whole[:, 4] - small[:, 4]).max() < 0.05
-    # The last layers, one for each of three strides and look, stay as they are: boxes to fractions of px.
+    # The last layers, two for each of three strides and look, stay as they are: boxes to fractions of px.
     graph = onnx.load(str(out)).graph
     scaled = {name for node in graph.node if node.op_type == "DequantizeLinear" for name in node.output}
     layers = [node for node in graph.node if node.op_type == "Conv"]
-    assert sum(node.input[1] not in scaled for node in layers) == 3 * (1 + twice) < len(layers)
+    assert sum(node.input[1] not in scaled for node in layers) == 2 * 3 * (1 + twice) < len(layers)
     assert all(node.input[1] not in scaled for node in layers[-1:])
     card = json.loads(heads[1].notes["card"])
     assert card["net"] == settings_of_kind(kind)
@@ -102,7 +103,7 @@ def test_what_lasts_and_what_is_counted_is_not_rounded(network, small_set, tmp_p
     (rounded,) = (node for node in graph.node if sums.output[0] in node.input)
     assert rounded.op_type == "QuantizeLinear"
     assert (values[rounded.input[1]], values[rounded.input[2]]) == (1.0, 0)
-    states = [port.name for port in graph.output if port.name != "boxes"]
+    states = [port.name for port in graph.output if port.name not in ("boxes", "spreads")]
     assert len(states) == 3
     for name in states:
         assert made[name].op_type == "Add"

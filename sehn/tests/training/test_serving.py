@@ -46,7 +46,9 @@ def shown_to(net, seed):
 
 def boxes_by_hand(net, shown, state, side):
     rows, kept = net.serve((*shown, *state))
-    return served_boxes(rows, *cell_places(side))[0].T, kept
+    places, strides = cell_places(side)
+    spreads = 2.0**0.5 * torch.exp(rows[0, :, 5:].clamp(-4.0, 4.0)) * strides[:, None]
+    return served_boxes(rows, places, strides)[0].T, spreads, kept
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -57,10 +59,11 @@ def test_two_looks_are_two_networks_each_asked_for_its_sizes(kind):
     with torch.no_grad():
         for seed in (1, 2):  # both remember, each its own
             whole, halved = shown_to(net, seed)
-            boxes, *state = served(*whole, *state)
-            near, first = boxes_by_hand(net, whole, first, SIDE)
-            far, second = boxes_by_hand(net, halved, second, HALF)
+            boxes, spreads, *state = served(*whole, *state)
+            near, of_near, first = boxes_by_hand(net, whole, first, SIDE)
+            far, of_far, second = boxes_by_hand(net, halved, second, HALF)
             far = far * torch.tensor([2.0, 2.0, 2.0, 2.0, 1.0])
+            torch.testing.assert_close(spreads[0].T, torch.cat([of_near, 2.0 * of_far]), rtol=1e-5, atol=1e-5)
             expected = torch.cat([near, far])
             size = (expected[:, 2] * expected[:, 3]).sqrt()
             is_near = torch.arange(len(expected)) < len(near)
@@ -78,7 +81,7 @@ def test_two_looks_are_two_networks_each_asked_for_its_sizes(kind):
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_file_that_looks_twice_holds_its_weights_once_and_is_read_back(kind, tmp_path):
     net = net_of(kind)
-    card = {"net": {"kind": kind, "width": 4}, "side": list(SIDE)}
+    card = {"net": {"kind": kind, "width": 4, "spreads": True}, "side": list(SIDE)}
     once, twice = tmp_path / "once.onnx", tmp_path / "twice.onnx"
     write_onnx(net, SIDE, card, once)
     write_onnx(net, SIDE, card, twice, second_look=True)

@@ -14,6 +14,8 @@ from jeat_graph_sehn.training.batches import Batches, stream_begin  # noqa: E402
 from jeat_graph_sehn.training.data_sets import Split, read_event_segments  # noqa: E402
 from jeat_graph_sehn.training.disturbances import draw_disturbances  # noqa: E402
 from jeat_graph_sehn.training.event_samples import draw_stream  # noqa: E402
+from jeat_graph_sehn.training.export import write_onnx  # noqa: E402
+from jeat_graph_sehn.training.network import DetectionNet  # noqa: E402
 from jeat_graph_sehn.training.procedure import TrainRequest, train  # noqa: E402
 from jeat_graph_sehn.training.settings import EventChanges, NetSettings, TrainSettings  # noqa: E402
 from jeat_graph_sehn.training.trainer import Trainer, TrainingJob  # noqa: E402
@@ -108,7 +110,7 @@ def test_a_training_on_streams_that_was_killed_writes_the_same_bytes(small_set, 
 
 def test_a_training_from_a_start_may_hold_its_first_layers(small_set, tmp_path):
     members = read_event_segments(small_set)
-    settings = TrainSettings(crop_px=(32, 32), batch=2, steps=2, hold_first=True, epochs=0.5, judged=1)
+    settings = TrainSettings(crop_px=(32, 32), batch=2, steps=2, hold="first", epochs=0.5, judged=1)
     job = TrainingJob(NET, settings, Split(members, members, ""), SIZE, "cpu", tmp_path / "c", "x")
     trainer = Trainer(job)
     before = {name: value.clone() for name, value in trainer.net.state_dict().items()}
@@ -116,8 +118,31 @@ def test_a_training_from_a_start_may_hold_its_first_layers(small_set, tmp_path):
     changed = {name for name, value in trainer.net.named_parameters() if not value.equal(before[name])}
     assert changed
     assert not any(name.startswith(("backbone.stem", "backbone.to_4")) for name in changed)
-    with pytest.raises(ConfigError, match="hold_first"):
+    with pytest.raises(ConfigError, match="hold=first"):
         train(TrainRequest((small_set,), tmp_path / "n.onnx", NET, settings))
+
+
+def test_a_training_may_learn_nothing_but_how_far_off_sides_are(small_set, tmp_path):
+    """From a file of before, whose card knows of no spreads."""
+    torch.manual_seed(2)
+    old = DetectionNet(replace(NET, spreads=False)).eval()
+    card = {"net": {name: value for name, value in vars(NET).items() if name != "spreads"}}
+    write_onnx(old, SIZE, card, tmp_path / "old.onnx")
+    members = read_event_segments(small_set)
+    settings = TrainSettings(crop_px=(32, 32), batch=2, steps=2, hold="boxes", epochs=0.5, judged=1)
+    start = (tmp_path / "old.onnx",)
+    job = TrainingJob(NET, settings, Split(members, members, ""), SIZE, "cpu", tmp_path / "c", "x", start)
+    trainer = Trainer(job)
+    before = {name: value.clone() for name, value in trainer.net.state_dict().items()}
+    trainer.run()
+    now = trainer.net.state_dict().items()
+    changed = {name for name, value in now if not value.equal(before[name])}
+    assert changed == {"head.spread.weight", "head.spread.bias"}
+    assert trainer.log[-1].loss_spreads != 0.0
+    for wrong, words in ((NET, "hold=boxes: give"), (replace(NET, spreads=False), "nothing is left")):
+        given = () if wrong is NET else start
+        with pytest.raises(ConfigError, match=words):
+            train(TrainRequest((small_set,), tmp_path / "n.onnx", wrong, settings, start=given))
 
 
 def test_what_a_memory_lasts_moves_faster_than_weights(small_set, tmp_path):

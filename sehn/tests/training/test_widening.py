@@ -74,7 +74,9 @@ def test_copies_of_a_channel_learn_different_things():
 def test_a_training_begins_with_the_file_of_a_narrow_network(tmp_path):
     torch.manual_seed(8)
     narrow = used(NetSettings(kind="frames", width=4))
-    write_onnx(narrow, SIDE, {"net": {"kind": "frames", "width": 4}}, tmp_path / "narrow.onnx")
+    write_onnx(
+        narrow, SIDE, {"net": {"kind": "frames", "width": 4, "spreads": True}}, tmp_path / "narrow.onnx"
+    )
     same = new_network(narrow.settings, (tmp_path / "narrow.onnx",)).eval()
     wide = new_network(NetSettings(kind="frames", width=12), (tmp_path / "narrow.onnx",)).eval()
     with torch.no_grad():

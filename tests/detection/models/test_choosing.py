@@ -50,10 +50,10 @@ def test_boxes_are_suppressed_and_averaged_as_by_a_loop(seed):
     half = rng.uniform(6, 10, (count, 2))
     corners = np.column_stack([middle - half, middle + half])
     scores = rng.permutation(np.linspace(0.2, 0.9, count))  # no two alike: whoever is better is plain
-    found, kept, _ = choose(decoded(corners, scores), None, 0.1, 0.55, 0.65)
+    chosen = choose(decoded(corners, scores), None, 0.1, 0.55, 0.65)
     expected, best = chosen_by_loop(corners.tolist(), scores.tolist(), 0.55, 0.65)
-    np.testing.assert_allclose(kept, best)
-    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    np.testing.assert_allclose(chosen.scores, best)
+    np.testing.assert_allclose(chosen.corners, expected, rtol=1e-9)
 
 
 def test_boxes_with_independent_errors_come_nearer_to_the_truth():
@@ -64,17 +64,17 @@ def test_boxes_with_independent_errors_come_nearer_to_the_truth():
     for _ in range(300):
         corners = truth + rng.normal(0, 1, (9, 4))
         for average, out in ((1.0, best), (0.65, mean)):
-            found, _, _ = choose(decoded(corners, np.linspace(0.8, 0.9, 9)), None, 0.1, 0.55, average)
-            out.append(found[0] - truth)
+            found = choose(decoded(corners, np.linspace(0.8, 0.9, 9)), None, 0.1, 0.55, average)
+            out.append(found.corners - truth)
     assert np.std(best) == pytest.approx(1.0, abs=0.06)
     assert np.std(mean) == pytest.approx(1.0 / 3.0, abs=0.03)
 
 
 def test_what_is_distinct_is_left_as_it_is():
     corners = [[0, 0, 10, 10], [1, 0, 11, 10]]
-    found, scores, _ = choose(decoded(corners, [0.5, 0.9], distinct=True), None, 0.1, 0.55, 0.65)
-    np.testing.assert_array_equal(found, corners[::-1])  # the best first
-    np.testing.assert_array_equal(scores, [0.9, 0.5])
+    found = choose(decoded(corners, [0.5, 0.9], distinct=True), None, 0.1, 0.55, 0.65)
+    np.testing.assert_array_equal(found.corners, corners[::-1])  # the best first
+    np.testing.assert_array_equal(found.scores, [0.9, 0.5])
 
 
 CAR, TRUCK, PERSON, BICYCLE = 2, 7, 0, 1
@@ -90,32 +90,40 @@ def of_classes(*rows, distinct=False):
 def test_one_thing_by_two_names_is_one_box_of_the_better_name(distinct):
     """Networks without suppression give one box twice, too, with the two classes that fit best."""
     found = of_classes((0, 0, 100, 60, 0.6, CAR), (2, 1, 101, 60, 0.7, TRUCK), distinct=distinct)
-    _, scores, classes = choose(found, None, 0.1, 0.5, across=0.65)
-    assert (scores.tolist(), classes.tolist()) == ([0.7], [TRUCK])
+    chosen = choose(found, None, 0.1, 0.5, across=0.65)
+    assert (chosen.scores.tolist(), chosen.classes.tolist()) == ([0.7], [TRUCK])
 
 
 def test_a_better_box_of_a_class_that_nobody_wants_still_says_what_the_thing_is():
     found = of_classes((0, 0, 40, 60, 0.5, 3), (1, 0, 40, 61, 0.6, BICYCLE))
-    assert len(choose(found, frozenset({CAR, 3}), 0.1, 0.5, across=0.65)[0]) == 0
+    assert len(choose(found, frozenset({CAR, 3}), 0.1, 0.5, across=0.65).scores) == 0
 
 
 def test_two_of_different_classes_that_hide_each_other_stay_two():
     """An IoU of .55: of one class it would be one vehicle, of two it is a car before a truck."""
     found = of_classes((0, 0, 100, 60, 0.6, CAR), (0, 0, 100, 109, 0.7, TRUCK))
-    assert len(choose(found, None, 0.1, 0.5, across=0.65)[0]) == 2
+    assert len(choose(found, None, 0.1, 0.5, across=0.65).scores) == 2
     both_cars = found._replace(classes=np.array([CAR, CAR]))
-    assert len(choose(both_cars, None, 0.1, 0.5, across=0.65)[0]) == 1
+    assert len(choose(both_cars, None, 0.1, 0.5, across=0.65).scores) == 1
 
 
 def test_a_rider_is_not_the_bicycle():
     found = of_classes((0, 0, 40, 100, 0.9, PERSON), (0, 5, 40, 100, 0.6, BICYCLE))
-    assert len(choose(found, None, 0.1, 0.5, across=0.65, apart=frozenset({PERSON}))[0]) == 2
+    assert len(choose(found, None, 0.1, 0.5, across=0.65, apart=frozenset({PERSON})).scores) == 2
 
 
 def test_only_boxes_of_its_own_class_move_a_box():
     found = of_classes((0, 0, 100, 60, 0.6, CAR), (0, 0, 100, 80, 0.6, TRUCK), (0, 2, 100, 62, 0.6, CAR))
-    corners, _, classes = choose(found, None, 0.1, 0.55, 0.65, across=0.9)
-    np.testing.assert_allclose(corners[classes == CAR], [[0, 1, 100, 61]])
+    chosen = choose(found, None, 0.1, 0.55, 0.65, across=0.9)
+    np.testing.assert_allclose(chosen.corners[chosen.classes == CAR], [[0, 1, 100, 61]])
+
+
+def test_spreads_stay_with_their_boxes_and_are_averaged_as_they_are():
+    corners = [[0, 0, 100, 60], [200, 0, 240, 30], [0, 2, 100, 62]]
+    spreads = np.array([[1.0, 2, 3, 4], [5, 6, 7, 8], [3, 2, 1, 0]])
+    chosen = choose(decoded(corners, [0.6, 0.9, 0.3])._replace(spreads=spreads), None, 0.1, 0.55, 0.65)
+    expected = [spreads[1], (2.0 * spreads[0] + spreads[2]) / 3.0]
+    np.testing.assert_allclose(chosen.spreads, expected)
 
 
 @given(st.integers(0, 10**6))
@@ -129,7 +137,8 @@ def test_what_stays_never_is_one_thing_twice(seed):
         rng.integers(0, 4, count),
         False,
     )
-    corners, scores, classes = choose(found, None, 0.2, 0.5, across=0.65, apart=frozenset({PERSON}))
+    chosen = choose(found, None, 0.2, 0.5, across=0.65, apart=frozenset({PERSON}))
+    corners, scores, classes = chosen.corners, chosen.scores, chosen.classes
     assert (np.diff(scores) <= 0.0).all()
     for a in range(len(scores)):
         for b in range(a):

@@ -14,9 +14,10 @@ from jeat_graph.detection.models import events as events_module
 from jeat_graph.detection.models import pictures as pictures_module
 from jeat_graph.detection.models.events import ModelEventDetector
 from jeat_graph.detection.models.fused import FusedDetector
+from jeat_graph.detection.models.layouts.record import DecodedBoxes
 from jeat_graph.detection.models.model_settings import ModelSettings
 from jeat_graph.detection.models.pictures import ModelPictureDetector
-from jeat_graph.detection.models.tiling import TileBoxes, Tiling, tiled_scale
+from jeat_graph.detection.models.tiling import Tiling, tiled_scale
 from jeat_graph.detection.settings import EventSettings
 from jeat_graph.io.events.evt3_writer import Evt3Writer
 
@@ -133,7 +134,7 @@ def test_a_vehicle_has_one_box_where_boxes_are_wrong(seed):
     for tile in tiling.cut(3.0 * lit_by(expected)[None, None]):
         rows = engine.run({"shown": tile})["found"][0]
         rows = rows[rows[:, 4] > 0].astype(float)
-        found.append(TileBoxes(rows[:, :4], rows[:, 4], rows[:, 5].astype(int)))
+        found.append(DecodedBoxes(rows[:, :4], rows[:, 4], rows[:, 5].astype(int), distinct=False))
     corners = tiling.together(found, 0.55).corners
     middles = (corners[:, :2] + corners[:, 2:]) / 2.0
     offs = np.abs(middles[:, None] - (expected[:, :2] + expected[:, 2:] / 2.0)[None]).max(axis=2)

@@ -9,12 +9,15 @@ from typing import Any, NamedTuple
 
 import numpy.typing as npt
 
-from jeat_graph.data.arrays import FloatArray, IntArray
+from jeat_graph.data.arrays import BoolArray, FloatArray, IntArray
 from jeat_graph.detection.models.exports import Export
 from jeat_graph.detection.models.onnx_head import Port
 
 #: Sides of an output with a row for each box: batch, rows, numbers.
 ROWS = 3
+#: Name of an output that may stand beside a layout's own: of each box standard deviations of its left, top,
+#: right and bottom side (px of the input), [1, 4, N] in the order of the boxes.
+SPREADS = "spreads"
 #: A network's outputs by name, in the order of the file.
 Outputs = Mapping[str, npt.NDArray[Any]]
 _IMAGENET_MEAN, _IMAGENET_STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
@@ -30,12 +33,20 @@ class DecodedBoxes(NamedTuple):
         scores: (M,) 0 to 1.
         classes: (M,) number of the class.
         distinct: whether no two boxes are of one thing, so that none are to be suppressed.
+        spreads: (M, 4) standard deviations of left, top, right and bottom (px of the input); None where the
+            network does not give them.
     """
 
     corners: FloatArray
     scores: FloatArray
     classes: IntArray
     distinct: bool
+    spreads: FloatArray | None = None
+
+    def taken(self, rows: IntArray | BoolArray) -> DecodedBoxes:
+        """Return some of the boxes."""
+        spreads = None if self.spreads is None else self.spreads[rows]
+        return DecodedBoxes(self.corners[rows], self.scores[rows], self.classes[rows], self.distinct, spreads)
 
 
 class Fit(IntEnum):

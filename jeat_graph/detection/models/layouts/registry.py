@@ -15,10 +15,18 @@ import numpy as np
 from jeat_graph.data.errors import DataError
 from jeat_graph.data.records import records_in
 from jeat_graph.detection.models import layouts
-from jeat_graph.detection.models.layouts.record import DecodedBoxes, Fit, Network, OutputLayout, Outputs
+from jeat_graph.detection.models.layouts.record import (
+    SPREADS,
+    DecodedBoxes,
+    Fit,
+    Network,
+    OutputLayout,
+    Outputs,
+)
 from jeat_graph.detection.models.onnx_head import Port
 
 _RECORDS = "LAYOUTS"
+_SIDES = 4
 
 
 @cache
@@ -70,16 +78,21 @@ def decode(name: str, outputs: Outputs, side: tuple[int, int], classes: int | No
 
     Args:
         name: of a layout.
-        outputs: by name, in the order of the file.
+        outputs: by name, in the order of the file; spreads are read in every layout.
         side: width and height of the input (px).
         classes: how many numbers of a row are scores of classes; None: all behind the box.
 
     Raises:
         DataError: the outputs are not of that layout.
     """
+    own = {key: value for key, value in outputs.items() if key != SPREADS}
     try:
         with np.errstate(invalid="ignore", over="ignore"):  # what is no number is counted by who asks
-            return all_layouts()[name].decode(outputs, side, classes)
+            found = all_layouts()[name].decode(own, side, classes)
+        if SPREADS not in outputs:
+            return found
+        spreads = np.asarray(outputs[SPREADS], dtype=np.float64)
+        return found._replace(spreads=spreads.reshape(_SIDES, len(found.scores)).T)
     except (ValueError, IndexError, KeyError, StopIteration) as error:
         shapes = ", ".join(f"{name} {list(value.shape)}" for name, value in outputs.items())
         raise DataError(f"the network's outputs {shapes} are not of the layout {name}: {error}") from None
