@@ -60,6 +60,8 @@ class ModelEventDetector(BinnedDetector):
     _usual_hz = USUAL_RATE_HZ
     #: Of its settings.
     _section = "model_events"
+    #: Whether its network sees no pictures.
+    _sees_events_alone = True
     #: Inputs that are neither windows nor memory.
     _beside: tuple[str, ...] = (ELAPSED,)
 
@@ -93,7 +95,15 @@ class ModelEventDetector(BinnedDetector):
         self._states: list[dict[str, npt.NDArray[Any]]] = []
         self._emptied()
         outputs = given_shapes(outputs, lambda: self._engine.run(self._blank(head)))
-        self._outputs = OutputReader(outputs, self._side, head.notes, self._settings, self._path, coco=False)
+        self._outputs = OutputReader(
+            outputs,
+            self._side,
+            head.notes,
+            self._settings,
+            self._path,
+            coco=False,
+            events=self._sees_events_alone,
+        )
         self._read = [port.name for port in outputs]
         kept = f", {len(self._memory)} states kept" if self._memory else ""
         order = "polarity" if self._by_polarity else "time"

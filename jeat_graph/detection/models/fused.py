@@ -52,6 +52,7 @@ class FusedDetector(ModelEventDetector):
 
     _usual_hz = BESIDE_RATE_HZ
     _section = "model_fused"
+    _sees_events_alone = False
     _beside = (PICTURE, GIVEN, ELAPSED)
 
     def __init__(

@@ -18,6 +18,8 @@ _ACROSS = 0.65
 #: says it (`layouts.record`).
 _OWN_SCORE = 0.1
 AUTO = "auto"
+#: What becomes of boxes of parts.
+DISCOUNT, KEEP = "discount", "keep"
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,13 @@ class ModelSettings(Section):
         1.0,
     )
 
+    parts: str = choice(
+        AUTO,
+        (AUTO, DISCOUNT, KEEP),
+        "what becomes of a box that a better one covers, as it covers lamps and wheels of a near vehicle; "
+        "discount: its score times 1 - c², c the share that is covered; keep: nothing; auto: discount for "
+        "networks of events that `train` made, else keep",
+    )
     tiles: int = number(
         1,
         "1",
@@ -134,6 +143,10 @@ class ModelSettings(Section):
         if self.score is not None:
             return self.score
         return _OWN_SCORE if own else all_layouts()[layout].least_score
+
+    def discounts(self, *, own_events: bool) -> bool:
+        """Return whether boxes of parts count less, of a network of events that `train` made, or another."""
+        return self.parts == DISCOUNT or (self.parts == AUTO and own_events)
 
     def open_side(self, noted: tuple[int, int] | None) -> tuple[int, int]:
         """Return width and height (px) where the shapes leave them open; `noted` is what the notes say."""

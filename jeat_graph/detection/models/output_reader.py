@@ -25,6 +25,7 @@ from jeat_graph.detection.models.layouts.record import DecodedBoxes
 from jeat_graph.detection.models.layouts.registry import decode, shapes_of
 from jeat_graph.detection.models.model_settings import AUTO, ModelSettings
 from jeat_graph.detection.models.onnx_head import CARD, Port
+from jeat_graph.detection.models.parts import discounted
 from jeat_graph.detection.models.recognising import layout_of, network_of
 from jeat_graph.detection.models.tiling import Tiling
 
@@ -64,6 +65,7 @@ class OutputReader:
         settings: how the network is read.
         path: the ONNX file.
         coco: whether classes without names may be those of COCO.
+        events: whether the network sees nothing but events.
 
     Attributes:
         layout: that of the outputs.
@@ -84,6 +86,7 @@ class OutputReader:
         path: Path,
         *,
         coco: bool,
+        events: bool = False,
     ) -> None:
         self._side, self._path, self._notes = side, path, notes
         self._asked = settings.layout
@@ -93,6 +96,7 @@ class OutputReader:
         self.layout = record.name
         self._settled = record.settled if settings.layout == AUTO else None
         self._score = settings.least_score(self.layout, own=own)
+        self._discounts = settings.discounts(own_events=own and events)
         names = class_names(notes)
         count = self._channels or (len(names) or None)
         self._scans, self._scans_without, self.no_numbers = 0, 0, 0
@@ -113,7 +117,9 @@ class OutputReader:
         return self.named(self.read_rows(outputs))
 
     def named(self, found: DecodedBoxes) -> FoundBoxes:
-        """Return boxes with the names of their classes."""
+        """Return boxes with the names of their classes, those of parts with less of their score."""
+        if self._discounts:
+            found = discounted(found, self._score)
         return FoundBoxes(found.corners, found.scores, self._named(found.classes), found.spreads)
 
     def together(self, found: list[DecodedBoxes], tiling: Tiling) -> FoundBoxes:

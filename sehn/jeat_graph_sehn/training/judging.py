@@ -16,13 +16,14 @@ from jeat_graph.detection.models.event_places import EventPlaces, event_scale
 from jeat_graph.detection.models.feeding import picture_input, place, usual_feed
 from jeat_graph.detection.models.layouts.registry import decode
 from jeat_graph.detection.models.model_settings import OWN_OVERLAPS, ModelSettings
+from jeat_graph.detection.models.parts import discounted
 from jeat_graph.eval.detection_ap import average_precision, match_greedily
 from jeat_graph_sehn.training.data_sets import EventSegment, FusedSegment, Picture
 from jeat_graph_sehn.training.event_samples import windows_of
 from jeat_graph_sehn.training.fused_network import FusedNet
 from jeat_graph_sehn.training.network import PICTURE_INPUT, VehicleNet
 from jeat_graph_sehn.training.serving import BOXES, ServedNet
-from jeat_graph_sehn.training.settings import NetSettings, TrainSettings
+from jeat_graph_sehn.training.settings import EVENTS, NetSettings, TrainSettings
 from jeat_graph_sehn.training.truth_at import TrueBoxes
 
 #: How the outputs are laid out, one of those in `detection.models.layouts`.
@@ -263,4 +264,6 @@ class _Reader:
         self._state = given[len(given) - len(self._state) :]
         found = decode(LAYOUT, {BOXES: boxes.cpu().numpy()}, self._side)
         chosen = choose(found, None, _LEAST_SCORE, *OWN_OVERLAPS)
+        if self._served.net.settings.kind == EVENTS:
+            chosen = discounted(chosen, _LEAST_SCORE)
         return chosen.corners, chosen.scores
