@@ -90,9 +90,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     pictures.add_argument(
         "--world",
-        choices=("fixed", "varied"),
+        choices=("fixed", "varied", "near"),
         help="fixed (default): the scenario's road and camera in all segments; varied: for each segment a "
-        "camera, road, surroundings, vehicles, light and traffic of its own",
+        "camera, road, surroundings, vehicles, light and traffic of its own; near: likewise, the camera low "
+        "beside the road and turned to it, so that vehicles pass close, from the side",
     )
     pictures.add_argument(
         "--event-camera",
@@ -194,7 +195,7 @@ def _pictures(args: argparse.Namespace, scenario: Scenario) -> int:
     from jeat_graph_sehn.simulation.dataset.protocol import Protocol
 
     given = {
-        "video": args.video or ("png" if args.world == "varied" else None),
+        "video": args.video or ("png" if args.world not in (None, "fixed") else None),
         "compression": args.compression,
         "shares": args.split,
     }

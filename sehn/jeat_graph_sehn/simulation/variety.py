@@ -42,7 +42,7 @@ _CLEAR_OVERHEAD_M = 5.6  # lowest camera above a lane, for lorries are 4 m high
 
 
 def vary(
-    rng: np.random.Generator, scenario: Scenario, imaging: ImagingConfig
+    rng: np.random.Generator, scenario: Scenario, imaging: ImagingConfig, *, near: bool = False
 ) -> tuple[Scenario, ImagingConfig, Surroundings]:
     """Draw a world.
 
@@ -50,6 +50,7 @@ def vary(
         rng: random stream of the segment's world.
         scenario: says which light there is (day, lamps, none), and what is not varied.
         imaging: renderer and cameras; exposure, glare and the sun are varied.
+        near: whether the camera stands low beside the road and is turned to it.
 
     Returns:
         Scenario, settings of renderer and cameras, and surroundings of this segment.
@@ -59,7 +60,10 @@ def vary(
     around = _surroundings(rng, road)
     day = scenario.light.ambient_lux >= _DAYLIGHT_LUX
     light, imaging = (_daylight if day else _night)(rng, scenario.light, imaging)
-    camera = _camera(rng, scenario.camera, road, around)
+    if near:
+        # It would see nothing but a wall.
+        around = around._replace(noise_left_m=0.0, noise_right_m=0.0, ramp_m=(0.0, 0.0))
+    camera = (_near_camera if near else _camera)(rng, scenario.camera, road, around)
     changed = replace(
         scenario,
         camera=camera,
@@ -196,7 +200,7 @@ def _camera(
     rng: np.random.Generator, camera: CameraConfig, road: RoadConfig, around: Surroundings
 ) -> CameraConfig:
     """A place above the road, or beside it, from which a good piece of the road is seen."""
-    edge = road.median_m / 2.0 + road.lane_width_m * road.lanes_per_direction + road.shoulder_m
+    edge = _edge_m(road)
     focal = camera.width * float(rng.uniform(0.65, 1.7))
     if rng.random() < 0.65:
         high = float(rng.uniform(_CLEAR_OVERHEAD_M, 12.0))
@@ -220,6 +224,29 @@ def _camera(
         yaw_deg=math.degrees(math.atan2(float(x) - offset, float(y))),
         roll_deg=float(np.clip(rng.normal(0.0, 1.2), -3.0, 3.0)),
     )
+
+
+def _near_camera(
+    rng: np.random.Generator, camera: CameraConfig, road: RoadConfig, around: Surroundings
+) -> CameraConfig:
+    """A place beside the road, no higher than a lorry, turned to it: who passes is cut by the edges."""
+    side = 1.0 if rng.random() < 0.5 else -1.0
+    focal = camera.width * float(rng.uniform(0.5, 1.0))
+    return replace(
+        camera,
+        fx=focal,
+        fy=focal,
+        mount_height_m=float(rng.uniform(1.8, 4.5)),
+        offset_m=side * (_edge_m(road) + float(rng.uniform(1.5, 6.0))),
+        pitch_deg=float(rng.uniform(1.0, 12.0)),
+        yaw_deg=-side * float(rng.uniform(35.0, 60.0)),
+        roll_deg=float(np.clip(rng.normal(0.0, 1.2), -3.0, 3.0)),
+    )
+
+
+def _edge_m(road: RoadConfig) -> float:
+    """Return how far from its middle the paved road ends (m)."""
+    return road.median_m / 2.0 + road.lane_width_m * road.lanes_per_direction + road.shoulder_m
 
 
 def _fleet(rng: np.random.Generator, fleet: FleetConfig) -> FleetConfig:

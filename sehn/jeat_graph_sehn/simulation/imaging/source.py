@@ -41,7 +41,8 @@ _LATER = (
     "insects_hz",
 )
 _BEFORE = 2  # periods before the first frame, so that it has all the events of its own before it
-WORLDS = ("fixed", "varied")
+FIXED_WORLD, VARIED, NEAR = "fixed", "varied", "near"
+WORLDS = (FIXED_WORLD, VARIED, NEAR)
 SENSORS = ("pictures", "rgb", "events")
 
 
@@ -66,7 +67,8 @@ class RenderedSource:
             imaging: renderer and cameras.
             seed: of all segments.
             frames: RGB frames a segment.
-            world: `fixed`, the same road and camera in all segments, or `varied`, one a segment.
+            world: `fixed`, the same road and camera in all segments; `varied`, one a segment; or `near`, one
+                a segment, with the camera beside the road and turned to it.
             sensors: `pictures` for both; `rgb` leaves events out, `events` makes black pictures.
             traffic: other numbers have the same worlds with other vehicles and other noise in them.
             masks: whether each step has a mask of its vehicles.
@@ -91,6 +93,11 @@ class RenderedSource:
         self.camera_config = scaled_camera(scenario.camera, render.width, render.height)
         self.camera = Camera.mounted(self.camera_config)
         self._same: Renderer | None = None  # of any segment, where all have one place in common
+
+    @property
+    def _drawn(self) -> bool:
+        """Whether each segment has a world of its own."""
+        return self.world != FIXED_WORLD
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -132,10 +139,11 @@ class RenderedSource:
     def _world(self, index: int) -> tuple[Scenario, ImagingConfig, Surroundings]:
         """Settings of segment `index`: drawn where worlds vary."""
         s, imaging, around = self.scenario, self.imaging, FIXED
-        if self.world == "varied":
+        if self._drawn:
             # Each light has worlds and traffic of its own, so that a net cannot learn one from the other.
             light = f"{s.light.ambient_lux:g}.{s.light.lamp_candela:g}.{s.light.lit_share:g}"
-            s, imaging, around = vary(stream(self.seed, f"segment.{index}.world.{light}"), s, imaging)
+            rng = stream(self.seed, f"segment.{index}.world.{light}")
+            s, imaging, around = vary(rng, s, imaging, near=self.world == NEAR)
             rng = stream(self.seed, f"segment.{index}.lens.{light}")
             imaging = replace(imaging, lens=vary_lens(rng, imaging.lens, s.camera))
             imaging = replace(imaging, render=vary_insects(rng, vary_wet(rng, imaging.render)))
@@ -170,9 +178,8 @@ class RenderedSource:
         if config.lens != LensConfig():
             lens = Lens(config.lens, camera, stream(seed, "lens"))
             scene = replace(scene, camera=lens.canvas)
-        varied = self.world == "varied"
-        renderer = Renderer(scene, config.render, seed, varied, like=self._same)
-        if lens is None and not varied:
+        renderer = Renderer(scene, config.render, seed, self._drawn, like=self._same)
+        if lens is None and not self._drawn:
             self._same = renderer
         exposure = choose_exposure(config.rgb, renderer.background.whole)
         eye: EventCamera | LensEventCamera | None = None
