@@ -31,8 +31,9 @@ _RETURN_PX = 0.5
 _INLIER_PX = (1.0, 3.0)
 # So many corners at least must agree, so large a share of those found, spread over so much of either side.
 _LEAST, _LEAST_SHARE, _LEAST_SPREAD = 15, 0.5, 0.08
-# The light is compared in every so many pixels each way, and is the same within this share.
-_EVERY, _SAME_LIGHT = 4, 0.01
+# What is looked at is what roots of grey levels, whose noise is the same in light and shade, have more than
+# their neighbourhood of this deviation (working px), times so many levels.
+_SMOOTH_PX, _DETAIL_GAIN, _MIDDLE = 6.0, 24.0, 128.0
 # Boxes are taken larger by this share on each side: detectors cut, and shadows go along.
 _MARGIN = 0.1
 # Degrees of freedom of t, reweightings, and the least error of a corner (px). Corners near each other err
@@ -50,8 +51,7 @@ _KEY_FOUND, _KEY_MOVED, _KEY_GROWN, _KEY_S = 0.5, 0.15, 0.1, 10.0
 class CameraSettings(Section):
     """Whether, and how, the motion of the camera is found in its pictures."""
 
-    # Not unless asked: where a camera stands, headlights that sweep a dark road pass for its motion.
-    follow: bool = flag(False, "whether networks tell how the camera moves")
+    follow: bool = flag(True, "whether networks tell how the camera moves")
     width_px: int = number(480, "px", "pictures are looked at in this width", 64, 4096)
 
 
@@ -134,7 +134,7 @@ class CameraFlow:
         if scale < 1.0:
             size = round(frame.shape[1] * scale), max(round(frame.shape[0] * scale), 1)
             grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
-        return np.asarray(grey, dtype=np.uint8), scale
+        return _detail(np.asarray(grey, dtype=np.uint8)), scale
 
     def _begin(self, grey: Grey, seen: BoolArray, t: float) -> None:
         """Take a picture for the key picture of those that follow."""
@@ -152,7 +152,6 @@ class CameraFlow:
 
         if len(key.corners) < _LEAST:
             return None, 0
-        grey = _in_light_of(key.grey, grey)
         turn, shift = self._step
         guess = _points(turn * self._pose.of(_complex(key.corners)) + shift)
         options: dict[str, Any] = {
@@ -264,16 +263,16 @@ def _is_moved(pose: Pose, shape: tuple[int, ...]) -> bool:
     return bool((np.abs(_going(pose, shape)) > np.maximum(_STILL_PX, _STILL_DEVIATIONS * std)).any())
 
 
-def _in_light_of(key: Grey, grey: Grey) -> Grey:
-    """Return a picture as bright as its key picture: most pixels have become brighter by the light."""
+def _detail(grey: Grey) -> Grey:
+    """Return what a picture has more or less than its neighbourhood: what lies there, not the light on it.
+
+    The cones of headlights that sweep a dark road are smooth, and the road in them does not move with them.
+    """
     import cv2
 
-    few = slice(None, None, _EVERY)
-    brighter = np.log((grey[few, few] + 1.0) / (key[few, few] + 1.0))
-    gain = float(np.exp(-np.median(brighter)))
-    if abs(gain - 1.0) < _SAME_LIGHT:
-        return grey
-    return np.asarray(cv2.convertScaleAbs(grey, alpha=gain, beta=gain - 1.0), dtype=np.uint8)
+    root = np.sqrt(grey.astype(np.float32))
+    more = root - cv2.GaussianBlur(root, (0, 0), _SMOOTH_PX)
+    return np.clip(_MIDDLE + _DETAIL_GAIN * more, 0.0, 255.0).astype(np.uint8)
 
 
 def _outside(shape: tuple[int, ...], boxes: FloatArray) -> BoolArray:

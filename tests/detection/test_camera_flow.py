@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from jeat_graph.data.scan import Scan
+from jeat_graph.detection import camera_flow
 from jeat_graph.detection.camera_flow import CameraFlow, CameraSettings, similarity
 
 WIDTH, HEIGHT, RATE = 640, 384, 20.0
@@ -37,7 +38,7 @@ def seen(grey, pose=(0.0, 0.0, 0.0, 0.0), noise=2.0, seed=0):
 
 def motions(frames, boxes=None):
     """The motions that are reported of pictures, one a picture or None."""
-    flow = CameraFlow(CameraSettings(follow=True))
+    flow = CameraFlow(CameraSettings())
     out = []
     for k, frame in enumerate(frames):
         one = NO_BOXES if boxes is None else boxes[k]
@@ -92,7 +93,7 @@ def test_known_motions_are_found(kind):
 
 def test_a_camera_that_stands_still_has_no_motion():
     """Pictures with noise, whose light changes: scans are the very same objects."""
-    grey, flow = street(), CameraFlow(CameraSettings(follow=True))
+    grey, flow = street(), CameraFlow(CameraSettings())
     for k in range(60):
         frame = seen(grey * (1.0 - 0.2 * np.sin(k / 9.0)), noise=4.0, seed=k)
         scan = Scan(k / RATE, "rgb", NO_BOXES, np.zeros(0))
@@ -108,6 +109,28 @@ def test_nothing_is_told_of_a_dark_picture():
 def test_nothing_is_told_where_the_picture_says_too_little():
     flat = np.full((HEIGHT, WIDTH, 3), 90, dtype=np.uint8)
     assert motions([flat] * 5) == [None] * 5
+
+
+@pytest.mark.parametrize("noise", [0.3, 1.0])
+def test_headlights_that_sweep_a_dark_road_are_not_the_camera(monkeypatch, noise):
+    """Two cones of light go over a road at rest; followed as it is, the picture goes along with them."""
+    x, y = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+    road = 0.15 + 0.1 * np.random.default_rng(3).random((HEIGHT, WIDTH))
+
+    def lit(k):
+        at = [(80.0 + 6.0 * k, 180.0), (300.0 + 6.0 * k, 240.0)]
+        cones = sum(np.exp(-((x - cx) ** 2 / 6000.0 + (y - cy) ** 2 / 1500.0)) for cx, cy in at)
+        return seen_as_it_is(2.0 + 160.0 * road * cones, noise, k)
+
+    frames = [lit(k) for k in range(20)]
+    assert motions(frames) == [None] * 20
+    monkeypatch.setattr(camera_flow, "_detail", lambda grey: grey)
+    assert any(one is not None for one in motions(frames))
+
+
+def seen_as_it_is(grey, noise, seed):
+    flat = grey + np.random.default_rng(seed).normal(0, noise, grey.shape)
+    return np.repeat(np.clip(flat, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
 @pytest.mark.parametrize("boxed", [True, False])
@@ -136,7 +159,7 @@ def test_after_pictures_that_tell_nothing_it_goes_on():
 
 
 def test_it_can_be_switched_off():
-    grey, flow = street(), CameraFlow()
+    grey, flow = street(), CameraFlow(CameraSettings(follow=False))
     for k in range(3):
         scan = Scan(k / RATE, "rgb", NO_BOXES, np.zeros(0))
         assert flow(seen(grey, (9.0 * k, 0, 0, 0)), scan) is scan

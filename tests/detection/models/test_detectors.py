@@ -212,9 +212,9 @@ def moved_pictures(folder, shift_px):
 
 
 def test_scans_of_a_network_tell_how_the_camera_moves(net, tmp_path, capsys):
-    """Whether detected and tracked in one step or two, and a line a scan; not where it is not asked for."""
-    plain = [*moved_pictures(tmp_path / "pan", 4), str(net)]
-    words = [*plain, "--detection-set", "camera.follow=true"]
+    """Whether detected and tracked in one step or two, and a line a scan; not where it shall not."""
+    words = [*moved_pictures(tmp_path / "pan", 4), str(net)]
+    still = [*words, "--detection-set", "camera.follow=false"]
     out = tmp_path / "d.csv"
     assert main(["detect", *words, "--out", str(out)]) == 0
     found = read_detections(out)
@@ -231,14 +231,14 @@ def test_scans_of_a_network_tell_how_the_camera_moves(net, tmp_path, capsys):
     assert main(["detect", *words, "--out", "-"]) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [len(line.get("camera_motion", ())) for line in lines] == [0] + [11] * 14
-    assert main(["detect", *plain, "--out", str(out)]) == 0
+    assert main(["detect", *still, "--out", str(out)]) == 0
     assert "camera_motion" not in out.read_text()
 
 
 def test_before_a_camera_that_stands_nothing_changes(net, tmp_path):
     words = [*moved_pictures(tmp_path / "still", 0), str(net), "--out"]
     assert main(["detect", *words, str(tmp_path / "a.csv")]) == 0
-    assert main(["detect", *words, str(tmp_path / "b.csv"), "--detection-set", "camera.follow=true"]) == 0
+    assert main(["detect", *words, str(tmp_path / "b.csv"), "--detection-set", "camera.follow=false"]) == 0
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
