@@ -272,7 +272,7 @@ def _detail(grey: Grey) -> Grey:
 
     root = np.sqrt(grey.astype(np.float32))
     more = root - cv2.GaussianBlur(root, (0, 0), _SMOOTH_PX)
-    return np.clip(_MIDDLE + _DETAIL_GAIN * more, 0.0, 255.0).astype(np.uint8)
+    return np.asarray(np.clip(_MIDDLE + _DETAIL_GAIN * more, 0.0, 255.0), dtype=np.uint8)
 
 
 def _outside(shape: tuple[int, ...], boxes: FloatArray) -> BoolArray:

@@ -239,9 +239,10 @@ class Trainer:
         job, steps = self._job, max(self._sums[-1], 1.0)
         most = job.settings.judged
         found = judge(self.average, job.split.judged, job.side, job.settings, most, on_look)["all"]
-        losses = (value / steps for value in self._sums[:-1])
+        loss, scores, boxes, spreads = (value / steps for value in self._sums[:-1])
         # With `minutes` the share is of time, which is never twice the same.
         done = min(progress, 1.0)
+        losses = (loss, scores, boxes, spreads)
         self.log.append(LogRow(self.step, done, self._rate(done), *losses, found.ap50, found.ap))
         self._sums = [0.0] * _SUMS
 
