@@ -40,8 +40,8 @@ MOST_LOOKS = 64
 _WINDOWS, _EACH = 12, 4
 #: What becomes 8-bit numbers. The last convolutions and what is behind them are no part of it.
 _LAYERS = ["Conv", "Relu", "Add", "Concat", "Resize"]
-#: In the names of the layers that add up the counts of cells.
-_SUMS = "/sums/"
+#: In the names of the layers that add up the counts of cells, and those of 2 x 2 pixels for a second look.
+_SUMS, _HALVES = "/sums/", "/halves/"
 _US = 1e6
 _Feed = dict[str, npt.NDArray[Any]]
 
@@ -252,7 +252,8 @@ def _cut_offs(model: Any) -> list[Any]:
     """Return the layers that cut off high counts, that of the first look first."""
     from_counts, found = {EVENTS_INPUT}, []
     for node in model.graph.node:
-        if node.op_type != "Conv" and node.input and node.input[0] in from_counts:
+        adds = node.op_type != "Conv" or _HALVES in node.name
+        if adds and node.input and node.input[0] in from_counts:
             from_counts.update(node.output)
             if node.op_type == "Clip":
                 found.append(node)
@@ -262,32 +263,38 @@ def _cut_offs(model: Any) -> list[Any]:
 def _counts_as_they_are(model: Any) -> dict[str, Any]:
     """Ask for counts, and their sums of a cell, as 8-bit numbers of scale 1: they are whole, and few.
 
-    At most 8 events of each of 16 pixels make 128.
+    At most 8 events of each of 16 pixels make 128. Sums for a second look may be more than 255, and are 255
+    then: they are cut off at 8 next.
     """
     unscaled = {"scale": np.array(1.0, dtype=np.float32), "zero_point": np.array(0, dtype=np.uint8)}
-    sums = [node for node in model.graph.node if node.op_type == "Conv" and _SUMS in node.name]
-    whole = [node.output[0] for node in (*_cut_offs(model), *sums)]
+    sums = [n for n in model.graph.node if n.op_type == "Conv" and (_SUMS in n.name or _HALVES in n.name)]
+    whole = [EVENTS_INPUT, *(node.output[0] for node in (*_cut_offs(model), *sums))]
     return {"TensorQuantOverrides": {name: [dict(unscaled)] for name in whole}}
 
 
 def _take_counts(model: Any) -> None:
-    """Let the network take counts of events as they are, bytes: those of the first look are not converted."""
-    from onnx import TensorProto, helper, numpy_helper
+    """Let the network take counts of events as they are, bytes, and cut them off as bytes."""
+    from onnx import TensorProto, numpy_helper
 
-    graph, limit = model.graph, _cut_offs(model)[0]
-    scaled = next(n for n in graph.node if n.op_type == "QuantizeLinear" and n.input[0] == limit.output[0])
-    most = next(numpy_helper.to_array(one) for one in graph.initializer if one.name == limit.input[2])
+    graph, limits = model.graph, _cut_offs(model)
+    made = {name: node for node in graph.node for name in node.output}
+    most = next(numpy_helper.to_array(one) for one in graph.initializer if one.name == limits[0].input[2])
     graph.initializer.append(numpy_helper.from_array(most.astype(np.uint8), "most_count"))
-    limit.input[2] = "most_count"
-    for node in graph.node:
-        if node.op_type == "DequantizeLinear" and node.input[0] == scaled.output[0]:
-            node.input[0] = limit.output[0]
-    graph.node.remove(scaled)
-    others = [node for node in graph.node if node is not limit and EVENTS_INPUT in node.input]
-    for node in others:  # a second look takes means of counts
-        for k, name in enumerate(node.input):
-            node.input[k] = "counts" if name == EVENTS_INPUT else name
-    if others:
-        graph.node.insert(0, helper.make_node("Cast", [EVENTS_INPUT], ["counts"], to=TensorProto.FLOAT))
+    for limit in limits:
+        limit.input[2] = "most_count"
+        if limit.input[0] in made:  # of a second look: the sums of the counts
+            limit.input[0] = made[limit.input[0]].input[0]
+        _unrounded(graph, limit.output[0])
+    _unrounded(graph, EVENTS_INPUT)
     del graph.value_info[:]
     graph.input[0].type.tensor_type.elem_type = TensorProto.UINT8
+
+
+def _unrounded(graph: Any, name: str) -> None:
+    """Let what is made of bytes take them, which were single precision, as they are, if anything does."""
+    rounded = [n for n in graph.node if n.op_type == "QuantizeLinear" and n.input[0] == name]
+    taken = {node.output[0]: name for node in rounded}
+    for node in graph.node:
+        node.input[:] = [taken.get(one, one) for one in node.input]
+    for node in rounded:
+        graph.node.remove(node)
