@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from jeat_graph.association.overlap import pairwise_covered
+from jeat_graph.data.interop import from_xyxy
 from jeat_graph.detection.models.layouts.record import DecodedBoxes
 
 
@@ -24,10 +26,8 @@ def discounted(found: DecodedBoxes, least: float) -> DecodedBoxes:
     """
     if len(found.scores) < 2:
         return found
-    low, high = found.corners[:, :2], found.corners[:, 2:]
-    both = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
-    shared = np.clip(both, 0.0, None).prod(axis=2)
-    covered = np.tril(shared / (high - low).prod(axis=1)[:, None], -1).max(axis=1)
+    boxes = from_xyxy(found.corners)
+    covered = np.tril(pairwise_covered(boxes, boxes), -1).max(axis=1)
     less = found._replace(scores=found.scores * (1.0 - covered**2))
     order = np.argsort(-less.scores, kind="stable")
     return less.taken(order[less.scores[order] >= least])

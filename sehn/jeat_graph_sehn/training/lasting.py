@@ -15,7 +15,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-from jeat_graph_sehn.training.blocks import ConvGru
+from jeat_graph_sehn.training.blocks import ConvGru, summing
 from jeat_graph_sehn.training.settings import STRIDES, NetSettings
 
 #: Name of the input that says how much time has passed since the window before (s).
@@ -75,8 +75,7 @@ class Traces(nn.Module):
         channels: of the features that it adds to.
 
     Attributes:
-        sums: of the counts of each cell, bin by bin. A convolution, though it learns nothing: of 8-bit
-            numbers it takes a tenth of the time of a mean, which engines compute in single precision.
+        sums: of the counts of each cell, bin by bin.
     """
 
     ages: Tensor
@@ -85,10 +84,7 @@ class Traces(nn.Module):
     def __init__(self, settings: NetSettings, channels: int) -> None:
         super().__init__()
         self._bin_s, self._bins = settings.bin_s, settings.bins
-        self.sums = nn.Conv2d(settings.channels, settings.channels, CELL_PX, CELL_PX, bias=False)
-        self.sums.requires_grad_(False)
-        with torch.no_grad():
-            self.sums.weight.copy_(torch.eye(settings.channels)[:, :, None, None].expand_as(self.sums.weight))
+        self.sums = summing(settings.channels, CELL_PX)
         self.see = nn.Conv2d(FEATURES, settings.width, 3, padding=1)
         self.carry = nn.Conv2d(settings.width, channels, 1)
         # At first nothing is added: a network that starts from one without is as good as that one is.

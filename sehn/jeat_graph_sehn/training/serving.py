@@ -13,6 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from jeat_graph.detection.models.layouts.record import SPREADS
+from jeat_graph_sehn.training.blocks import summing
 from jeat_graph_sehn.training.network import (
     EVENTS_INPUT,
     PICTURE_INPUT,
@@ -49,7 +50,8 @@ class ServedNet(nn.Module):
         self.net = net
         self.looks = (side, (side[0] // 2, side[1] // 2)) if second_look else (side,)
         self._names = tuple(net.inputs((COARSEST, COARSEST)))
-        self.halves = _Halves(net.settings.channels) if second_look and EVENTS_INPUT in self._names else None
+        halves = second_look and EVENTS_INPUT in self._names
+        self.halves = summing(net.settings.channels, 2) if halves else None
         for k, look in enumerate(self.looks):
             places, strides = cell_places(look)
             self.register_buffer(f"places_{k}", places)
@@ -103,27 +105,6 @@ class ServedNet(nn.Module):
         if self.net.settings.spreads:
             found.append(served_spreads(rows, strides))
         return found, kept
-
-
-class _Halves(nn.Module):
-    """Sums of the counts of 2 x 2 pixels. A convolution: engines add up 8-bit numbers by it as they are.
-
-    Args:
-        channels: of the windows.
-    """
-
-    def __init__(self, channels: int) -> None:
-        super().__init__()
-        # Channel by channel it would be quicker on paper, and takes twice the time in 8 bits.
-        self.add = nn.Conv2d(channels, channels, 2, 2, bias=False)
-        self.add.requires_grad_(False)
-        with torch.no_grad():
-            self.add.weight.copy_(torch.eye(channels)[:, :, None, None].expand_as(self.add.weight))
-
-    def forward(self, counts: Tensor) -> Tensor:
-        """Return (B, C, H/2, W/2) of counts (B, C, H, W)."""
-        added: Tensor = self.add(counts)
-        return added
 
 
 def _among(boxes: Tensor, sign: float, limit_px: float) -> Tensor:
